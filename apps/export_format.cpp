@@ -25,28 +25,30 @@ using Words = std::vector<std::string>;
 
 const Words kFormats{"lerobot", "zarr", "ftp1", "univtac"};
 
-// argv[1] is the folder of a package beside the program, or empty. A package that is missing is the
-// world's mistake, so the code is 3.
+// argv[1] is the folder of a package beside the program, or empty; argv[2] is the module, argv[3]
+// the subcommand that it serves. A missing package is the world's mistake, so the code is 3.
 constexpr const char* kStart = R"(
-import importlib.util, json, sys
-place, words = sys.argv[1], sys.argv[2:]
-sys.argv = ["tangere export", *words]
+import importlib, importlib.util, json, sys
+place, module, command, words = sys.argv[1], sys.argv[2], sys.argv[3], sys.argv[4:]
+sys.argv = [f"tangere {command}", *words]
 if place:
     sys.path.insert(0, place)
 def missing(name, package):
-    text = f"--to needs the Python package {name}, which {sys.executable} does not have; expected "
-    text += f"it from `{sys.executable} -m pip install {package}`, or another TANGERE_PYTHON"
+    what = "--to" if command == "export" else "an export"
+    text = f"{what} needs the Python package {name}, which {sys.executable} does not have; "
+    text += f"expected it from `{sys.executable} -m pip install {package}`, "
+    text += "or another TANGERE_PYTHON"
     if "--json" in words:
-        print(json.dumps({"command": "export", "exit_code": 3, "error": text}))
-    print(f"tangere export: {text}", file=sys.stderr)
+        print(json.dumps({"command": command, "exit_code": 3, "error": text}))
+    print(f"tangere {command}: {text}", file=sys.stderr)
     sys.exit(3)
 if importlib.util.find_spec("tangere") is None:
     missing("tangere", "'tangere[data]'")
 try:
-    from tangere.export import main
+    main = importlib.import_module(module).main
 except ModuleNotFoundError as error:
     missing(error.name, "'tangere[data]'")
-sys.exit(main(words, prog="tangere export"))
+sys.exit(main(words, prog=f"tangere {command}"))
 )";
 
 /// Where a build and a wheel have the package: build/release/python, and the folder in which the
@@ -136,22 +138,29 @@ void export_by_python(const std::string& input, const std::string& output, bool 
     throw InputError(
         fmt::format("unknown format '{}'{}", options.to, suggestion(options.to, known)));
   }
-  const char* const chosen = std::getenv("TANGERE_PYTHON");
-  const std::string python = chosen != nullptr && *chosen != '\0' ? chosen : "python3";
-  Words words{python, "-c", kStart, package_beside_program(), input, output, "--to", options.to};
+  Words words{input, output, "--to", options.to};
   const Words more = words_of(options);
   words.insert(words.end(), more.begin(), more.end());
   add_words(words, "--overwrite", overwrite);
+  run_python("tangere.export", "export", words, console);
+}
+
+void run_python(const std::string& module, const std::string& command,
+                const std::vector<std::string>& arguments, const Console& console) {
+  const char* const chosen = std::getenv("TANGERE_PYTHON");
+  const std::string python = chosen != nullptr && *chosen != '\0' ? chosen : "python3";
+  Words words{python, "-c", kStart, package_beside_program(), module, command};
+  words.insert(words.end(), arguments.begin(), arguments.end());
   add_words(words, "--quiet", console.quiet);
   add_words(words, "--json", console.json);
-  std::vector<char*> arguments;
-  for (std::string& word : words) arguments.push_back(word.data());
-  arguments.push_back(nullptr);
-  execvp(python.c_str(), arguments.data());
+  std::vector<char*> raw;
+  for (std::string& word : words) raw.push_back(word.data());
+  raw.push_back(nullptr);
+  execvp(python.c_str(), raw.data());
   throw IoError(
-      fmt::format("--to {} needs Python, and '{}' cannot be started: {}; expected it on "
-                  "PATH, or TANGERE_PYTHON to name it",
-                  options.to, python, std::strerror(errno)));
+      fmt::format("{} needs Python, and '{}' cannot be started: {}; expected it on PATH, or "
+                  "TANGERE_PYTHON to name it",
+                  command == "export" ? "--to" : "an export", python, std::strerror(errno)));
 }
 
 }  // namespace tangere::apps

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "apps/command.hpp"
 #include "apps/console.hpp"
@@ -34,5 +35,10 @@ void add_format_options(CLI::App& app, FormatOptions& options);
 [[noreturn]] void export_by_python(const std::string& input, const std::string& output,
                                    bool overwrite, const FormatOptions& options,
                                    const Console& console);
+
+/// Replaces this process by the function main() of a module of the Python package, for a subcommand
+/// of this program. Returns only by throwing IoError if there is no Python.
+[[noreturn]] void run_python(const std::string& module, const std::string& command,
+                             const std::vector<std::string>& arguments, const Console& console);
 
 }  // namespace tangere::apps

@@ -175,6 +175,7 @@ int generate_task(const GenerateOptions& options, const Console& console, const 
               : make_policy(task, kind, options.controls, variation);
   Job job;
   job.run = episode_options(options, task);
+  job.run.record = record_of_task(options.record, task);
   const GradientKind gradients = requested_gradients(options, true);
   const TaskActions actions = [&](const TaskView& view, std::span<const double> observation,
                                   std::span<double> action) {
@@ -317,9 +318,10 @@ void add_storage_options(CLI::App& app, GenerateOptions& o) {
            "Observations to store, separated by commas: q, v, variables, bodies or bodies.NAME, a "
            "sensor's field (pad), pad.pressure, pad.shear, pad.sum, pad.ideal, pad.markers, "
            "pad.surface, pad.flow, pad.channels, pad.height, pad.rgb or pad.rgb_marker, a camera's "
-           "eye.rgb, eye.depth or eye.ids; pad/10 is every 10th step, q/final the end alone; of a "
-           "task its "
-           "observations [default: the scene's <outputs>, or all but bodies]");
+           "eye.rgb, eye.depth or eye.ids; pad/10 is every 10th step, which within a row makes a "
+           "window, and q/final the end alone; of a task its observations and readings of its "
+           "sensors [default: the scene's <outputs>, or all but bodies; of a task its "
+           "observations]");
   add_text(app, "--gradients", o.gradients, "KIND",
            "Derivatives beside the rows: none, return (of the task's, or of a scene's --loss) or "
            "jacobians (of each row's state by the row before); not with --sleep [default: none]");

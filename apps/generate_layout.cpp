@@ -7,7 +7,6 @@
 
 #include "engine/base/hash.hpp"
 #include "io/dataset/dataset_from_model.hpp"
-#include "io/files/name_list.hpp"
 #include "io/files/text_file.hpp"
 #include "kernels/table/isa.hpp"
 
@@ -20,14 +19,6 @@ std::string controls_named(const std::string& path) {
   constexpr std::size_t kLargestTable = std::size_t{1} << 32;
   const std::string text = read_text_file(path, kLargestTable, "a csv file");
   return fmt::format("a table of checksum {:016x}", hash_bytes(text));
-}
-
-/// Names of a task's observations.
-std::vector<TimedName> split_if_any(const std::string& list) {
-  std::vector<TimedName> record;
-  if (!list.empty())
-    for (std::string& name : split_names("--record", list)) record.push_back({std::move(name), {}});
-  return record;
 }
 
 /// For a shell that reads the command again.
@@ -78,7 +69,7 @@ DatasetLayout make_layout(const GenerateOptions& options, const Model& model,
   description.shards = options.shards.value_or(0);
   description.compression = options.compress;
   description.jpeg_quality = jpeg_quality_named(options.pictures);
-  description.record = task == nullptr ? run.record : split_if_any(options.record);
+  description.record = run.record;
   description.sparse = options.tactile == "sparse";
   description.gradients_of =
       options.loss.empty() ? options.gradients : options.gradients + " " + options.loss;

@@ -10,6 +10,7 @@
 #include "apps/command.hpp"
 #include "apps/scene_run.hpp"
 #include "io/dataset/dataset_files.hpp"
+#include "io/export/exported_set.hpp"
 #include "io/trajectory/trajectory_reader.hpp"
 
 namespace tangere::apps {
@@ -48,7 +49,41 @@ int info_of_run(const std::string& path, const TrajectorySummary& run, const Con
   return kDone;
 }
 
+/// An export: its arrays.
+int info_of_export(const std::string& path, const ExportedSet& set, const Console& console) {
+  Json arrays = Json::array();
+  std::string text = fmt::format("{}: {}\n", set.format, set.title);
+  if (!set.command.empty())
+    text += fmt::format("made of: {}\nby Tangere {}\n", set.command, set.tangere_version);
+  if (set.seconds_per_frame > 0) text += fmt::format("a frame lasts {} s\n", set.seconds_per_frame);
+  text += "arrays: the shape of a frame\n";
+  for (const ExportedArray& array : set.arrays) {
+    text += fmt::format("  {} ({}) {}{}\n", array.name, fmt::join(array.shape, ", "), array.type,
+                        array.unit.empty() ? "" : " [" + array.unit + "]");
+    arrays.push_back(
+        {{"name", array.name}, {"type", array.type}, {"shape", array.shape}, {"unit", array.unit}});
+  }
+  console.print(text + fmt::format("episodes: {}, frames: {}, files: {}, {} bytes", set.episodes,
+                                   set.frames, set.files, set.bytes));
+  console.result({{"command", "info"},
+                  {"exit_code", static_cast<int>(kDone)},
+                  {"input", path},
+                  {"format", set.format},
+                  {"title", set.title},
+                  {"made_of", set.command},
+                  {"tangere_version", set.tangere_version},
+                  {"episodes", set.episodes},
+                  {"frames", set.frames},
+                  {"seconds_per_frame", set.seconds_per_frame},
+                  {"files", set.files},
+                  {"bytes", set.bytes},
+                  {"arrays", arrays}});
+  return kDone;
+}
+
 int info(const std::string& path, const Console& console) {
+  if (const std::optional<ExportedSet> set = find_export(path))
+    return info_of_export(path, *set, console);
   if (std::filesystem::is_regular_file(path))
     if (const std::optional<TrajectorySummary> run = summarise_trajectory(path))
       return info_of_run(path, *run, console);
@@ -95,10 +130,12 @@ Command add_info(CLI::App& program) {
   const auto input = std::make_shared<std::string>();
   const auto console = std::make_shared<Console>();
   CLI::App& app = add_command(program, "info",
-                              "Say what a data set or a trajectory holds: settings, shapes, counts",
+                              "Say what a data set, an export or a trajectory holds: settings, "
+                              "shapes, counts",
                               "tangere info balls");
   add_text(app, "DIR", *input, "",
-           "Folder of shards, one file of a data set, or a file of 'tangere simulate'")
+           "Folder of shards, one file of a data set, what 'tangere export' made of it, or a file "
+           "of 'tangere simulate'")
       .required();
   add_console_options(app, *console);
   return {&app, [=](const ProgramInfo&) { return info(*input, *console); }, [] { return true; }};

@@ -16,14 +16,17 @@ namespace {
 
 constexpr const char* kTransmissions = "transmissions";
 
-/// A word and what it means; throws for one that the scene does not have.
-TimedName requested_output(const std::string& word, const std::string& where, const Model& model) {
-  TimedName requested;
+TimedName timed_name(const std::string& word, const std::string& where) {
   try {
-    requested = split_times(word);
+    return split_times(word);
   } catch (const InputError& error) {
     throw InputError(where + ": " + error.what());
   }
+}
+
+/// A word and what it means; throws for one that the scene does not have.
+TimedName requested_output(const std::string& word, const std::string& where, const Model& model) {
+  const TimedName requested = timed_name(word, where);
   const std::string& name = requested.name;
   const std::optional<FieldOutput> reading = find_output(model.scene(), name);
   const bool is_sensor = reading.has_value(),
@@ -100,6 +103,35 @@ Record record_of(const std::string& option, const Model& model) {
             [](const FieldOutput& a, const FieldOutput& b) {
               return std::pair(a.sensor, a.form) < std::pair(b.sensor, b.form);
             });
+  return record;
+}
+
+std::vector<TimedName> record_of_task(const std::string& option, const Task& task) {
+  std::vector<TimedName> record;
+  if (option.empty()) return record;
+  const Scene& scene = task.model().scene();
+  std::vector<std::string> known{"q", "v"};
+  for (const TensorSpec& tensor : task.spec().observations) known.push_back(tensor.name);
+  const auto observed = std::ssize(known);
+  for (const TactileDescription& sensor : scene.sensors)
+    for (const FieldForm form : field_forms()) known.push_back(output_name(sensor.name, form));
+  const std::string where = "--record";
+  for (const std::string& word : split_names(where, option)) {
+    TimedName requested = timed_name(word, where);
+    const std::string& name = requested.name;
+    const auto place = std::find(known.begin(), known.end(), name);
+    if (place == known.end())
+      throw InputError(
+          fmt::format("{}: unknown observation '{}'{}", where, name, suggestion(name, known)));
+    if (place - known.begin() >= observed)
+      if (const std::string reason = reason_against(scene, *find_output(scene, name));
+          !reason.empty())
+        throw InputError(fmt::format("{}: '{}', but {}", where, word, reason));
+    if (std::any_of(record.begin(), record.end(),
+                    [&](const TimedName& other) { return other.name == name; }))
+      throw InputError(fmt::format("{}: '{}' is listed twice; expected it once", where, name));
+    record.push_back(std::move(requested));
+  }
   return record;
 }
 

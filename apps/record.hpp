@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "tasks/catalogue/task.hpp"
 #include "tasks/run/rollout.hpp"
 
 namespace tangere::apps {
@@ -20,6 +21,10 @@ struct Record {
 /// Returns the outputs of the option; if it is empty, those of the scene. Throws InputError for a
 /// name that the scene does not have. Single bodies need take_bodies().
 Record record_of(const std::string& option, const Model& model);
+
+/// Returns what the option names of a task's observations and of the readings of its sensors; none:
+/// all observations. Throws InputError for another name.
+std::vector<TimedName> record_of_task(const std::string& option, const Task& task);
 
 /// Adds the shear state: at the requested rows, else where a run can be continued from: at its last
 /// row, or if rows of q are thinned at each of them.

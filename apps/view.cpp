@@ -6,8 +6,12 @@
 
 #include "apps/arguments.hpp"
 #include "apps/command.hpp"
+#include "apps/export_format.hpp"
 #include "apps/run_options.hpp"
+#include "engine/base/error.hpp"
+#include "io/export/exported_set.hpp"
 #include "io/files/part_file.hpp"
+#include "io/hdf5/reading_note.hpp"
 #include "io/view/view_page.hpp"
 #include "io/view/view_reader.hpp"
 
@@ -23,7 +27,31 @@ struct ViewArguments {
   bool overwrite = false;
 };
 
+/// Replaces this process by the Python package, which has the libraries of the formats, if the
+/// input is an export.
+void view_if_export(const ViewArguments& options, const Console& console) {
+  const std::optional<ExportedSet> set = find_export(options.input);
+  if (!set) return;
+  if (set->format == "csv")
+    throw InputError(
+        fmt::format("'{}' is a table, which has no scene; expected a data set, or an "
+                    "export of another format",
+                    options.input));
+  std::vector<std::string> words{options.input, "--output", options.output};
+  const auto add = [&](const char* name, const auto& value) {
+    if (value) words.insert(words.end(), {name, std::to_string(*value)});
+  };
+  add("--episode", options.what.episode);
+  add("--episodes", options.episodes);
+  add("--frames", options.frames);
+  if (!options.what.scene.empty()) words.insert(words.end(), {"--scene", options.what.scene});
+  if (options.overwrite) words.emplace_back("--overwrite");
+  const h5::NotReading computing;  // else the timer of calls of HDF5 would end Python
+  run_python("tangere._view_export", "view", words, console);
+}
+
 int view(const ViewArguments& options, const Console& console) {
+  view_if_export(options, console);
   ViewOptions what = options.what;
   what.episodes = options.episodes.value_or(what.episodes);
   what.frames = options.frames.value_or(what.frames);
@@ -65,7 +93,8 @@ Command add_view(CLI::App& program) {
       add_command(program, "view", "Write a page on which a trajectory or data set moves",
                   "tangere view ball.h5 -o ball.html");
   add_text(app, "FILE", o.input, "",
-           "HDF5 file of 'tangere simulate', or folder or file of a data set")
+           "HDF5 file of 'tangere simulate', folder or file of a data set, or what 'tangere "
+           "export' made of it")
       .required();
   add_text(app, "-o,--output", o.output, "F.html", "Page to write").required();
   const AddedOption episode =

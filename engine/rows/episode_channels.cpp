@@ -16,6 +16,11 @@ using ChannelKind = EpisodeChannel::Kind;
 
 bool perfect(const SensorLayout& sensor) { return sensor.imperfections.empty(); }
 
+bool is_one_of(const std::vector<TensorSpec>& observations, const std::string& name) {
+  return std::any_of(observations.begin(), observations.end(),
+                     [&](const TensorSpec& each) { return each.name == name; });
+}
+
 class ChannelList {
  public:
   ChannelList(std::span<const TimedName> record, int every) : record_(record), every_(every) {}
@@ -31,8 +36,12 @@ class ChannelList {
     const TimedName* const one = requested(name);
     const OutputTimes times = one != nullptr ? one->times : OutputTimes{};
     if (times.every % every_ != 0)
-      throw InputError(fmt::format("'{}{}', and a row is every {} steps; expected a multiple of {}",
-                                   name, to_string(times), every_, every_));
+      throw InputError(
+          fmt::format("'{}{}', and a row is every {} steps; expected a multiple of {}{}", name,
+                      to_string(times), every_, every_,
+                      times.every < every_ ? ": windows are of forces, displacements and heights "
+                                             "that sensors read"
+                                           : ""));
     return all_.emplace_back(EpisodeChannel{.kind = kind,
                                             .name = name,
                                             .shape = std::move(shape),
@@ -44,8 +53,15 @@ class ChannelList {
 
   void add_reading(std::span<const SensorLayout> sensors, FieldOutput reading) {
     const SensorLayout& sensor = sensors[static_cast<std::size_t>(reading.sensor)];
-    EpisodeChannel& channel = add(ChannelKind::reading, output_name(sensor.name, reading.form),
-                                  reading_shape(sensor, reading.form));
+    const std::string name = output_name(sensor.name, reading.form);
+    const std::vector<std::uint64_t> shape = reading_shape(sensor, reading.form);
+    const TimedName* const one = requested(name);
+    const std::int64_t between = one != nullptr ? one->times.every : 0;
+    const bool windowed = between > 0 && between < every_ && !is_colour(reading.form);
+    EpisodeChannel& channel = windowed ? add_window(name, shape, static_cast<int>(between))
+                                       : add(ChannelKind::reading, name, shape);
+    channel.unit = unit_text(sensor, reading.form);
+    channel.meaning = components_text(sensor, reading.form);
     channel.reading = {reading.sensor, reading.form};
     // Channels have offsets, which need no touch.
     channel.touch = (perfect(sensor) || is_ideal(reading.form)) && !is_colour(reading.form) &&
@@ -63,10 +79,56 @@ class ChannelList {
   [[nodiscard]] std::vector<EpisodeChannel> take() { return std::move(all_); }
 
  private:
+  /// Adds a reading that is taken every `between` steps of a row.
+  EpisodeChannel& add_window(const std::string& name, std::vector<std::uint64_t> shape,
+                             int between) {
+    if (every_ % between != 0)
+      throw InputError(
+          fmt::format("'{}/{}', and a row is every {} steps; expected a divisor of {}, for a "
+                      "window, or a multiple",
+                      name, between, every_, every_));
+    const int window = every_ / between;
+    shape.insert(shape.begin(), static_cast<std::uint64_t>(window));
+    return all_.emplace_back(EpisodeChannel{.kind = ChannelKind::reading,
+                                            .name = name,
+                                            .shape = std::move(shape),
+                                            .unit = {},
+                                            .meaning = {},
+                                            .window = window});
+  }
+
   std::span<const TimedName> record_;
   int every_;
   std::vector<EpisodeChannel> all_;
 };
+
+/// Every row of a task has all that is recorded, because its episodes differ in length. Throws
+/// InputError for times other than those of windows.
+void refuse_times(std::span<const TimedName> record, const std::vector<TensorSpec>& observations,
+                  std::span<const SensorLayout> sensors, int every) {
+  for (const TimedName& one : record) {
+    const bool observed = one.name == "q" || one.name == "v" || is_one_of(observations, one.name);
+    const bool within = !one.times.final && one.times.every < every;
+    if (!one.times.given() || (within && !observed)) continue;
+    throw InputError(fmt::format(
+        "'{}{}' of a task; expected '{}', which is in every row{}", one.name, to_string(one.times),
+        one.name,
+        every == 1 || sensors.empty()
+            ? ""
+            : fmt::format(", or a window of a sensor, such as '{}/1', of less than {} steps",
+                          sensors.front().name, every)));
+  }
+}
+
+void add_readings(ChannelList& list, std::span<const SensorLayout> sensors,
+                  const std::vector<TensorSpec>& observations = {}) {
+  for (int s = 0; s < std::ssize(sensors); ++s)
+    for (const FieldForm form : field_forms()) {
+      const std::string name = output_name(sensors[static_cast<std::size_t>(s)].name, form);
+      if (!is_one_of(observations, name) && list.requested(name) != nullptr)
+        list.add_reading(sensors, {s, form});
+    }
+}
 
 void add_bodies(ChannelList& list, std::span<const std::string> bodies) {
   std::vector<int> all;
@@ -96,6 +158,7 @@ std::vector<EpisodeChannel> episode_channels(const RunFacts& facts,
   list.add(ChannelKind::q, "q", {facts.q_names.size()}, "q_units", "coordinates");
   list.add(ChannelKind::v, "v", {facts.v_names.size()}, "v_units", "velocities");
   if (facts.task) {
+    refuse_times(record, facts.task->observations, sensors, every);
     const bool all_perfect = std::all_of(sensors.begin(), sensors.end(), perfect);
     for (const TensorSpec& tensor : facts.task->observations) {
       EpisodeChannel& channel =
@@ -104,6 +167,7 @@ std::vector<EpisodeChannel> episode_channels(const RunFacts& facts,
       channel.touch = tensor.touch && all_perfect;
       channel.task_bytes = tensor.own_bytes;
     }
+    add_readings(list, sensors, facts.task->observations);
     return list.take();
   }
   if (!facts.end_effector_names.empty())
@@ -111,10 +175,7 @@ std::vector<EpisodeChannel> episode_channels(const RunFacts& facts,
   add_bodies(list, bodies);
   for (int s = 0; s < std::ssize(sensors); ++s)
     if (record.empty()) list.add_reading(sensors, {s});
-  for (int s = 0; s < std::ssize(sensors) && !record.empty(); ++s)
-    for (const FieldForm form : field_forms())
-      if (list.requested(output_name(sensors[static_cast<std::size_t>(s)].name, form)) != nullptr)
-        list.add_reading(sensors, {s, form});
+  if (!record.empty()) add_readings(list, sensors);
   for (int c = 0; c < std::ssize(cameras); ++c)
     for (const FieldForm form : view_forms())
       list.add_view(cameras[static_cast<std::size_t>(c)], {c, form});

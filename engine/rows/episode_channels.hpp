@@ -29,12 +29,19 @@ struct EpisodeChannel {
   FieldOutput reading = {};          ///< of Kind::reading
   bool requested = true;
   OutputTimes times = {};  ///< in rows; none: at every row
+  /// Readings of a row, K / `window` steps apart, the last one at the row. Above 1, `shape` begins
+  /// with it.
+  int window = 1;
   /// Touch: all its numbers are 0 without contact. Of a sensor with imperfections only the ideal
   /// field and the markers are, and a task with such a sensor has none.
   bool touch = false;
   std::size_t task_bytes = 0;  ///< TensorSpec::own_bytes
 
   [[nodiscard]] std::size_t width() const;  ///< numbers of a row
+  /// Numbers of one of the readings of a row.
+  [[nodiscard]] std::size_t reading_width() const {
+    return width() / static_cast<std::size_t>(window);
+  }
   /// Bytes of a number whose type does not follow the precision of the run; else 0.
   [[nodiscard]] std::size_t own_bytes() const {
     return kind == Kind::reading ? tangere::own_bytes(reading.form) : task_bytes;
@@ -42,11 +49,13 @@ struct EpisodeChannel {
 };
 
 /// Returns the observations that episodes may have, those that are not recorded among them: q and
-/// v, then all that a task observes, or the end effectors (if any), and what `record` names of
-/// bodies, sensors and cameras of a scene. `facts`: names of coordinates and end effectors, and the
-/// task; `bodies`: names; `record`: names, with times in steps; none: everything except bodies and
-/// cameras.
-/// `every`: steps of a row. Throws InputError for times that are no multiple of it.
+/// v, then all that a task observes and what `record` names of the sensors of its scene; or the end
+/// effectors (if any), and what `record` names of bodies, sensors and cameras of a scene. `facts`:
+/// names of coordinates and end effectors, and the task; `bodies`: names; `record`: names, with
+/// times in steps; none: everything except bodies, cameras and sensors beside a task.
+/// `every`: K, steps of a row. A reading of a sensor that is taken every n < K steps is a window of
+/// K / n readings. Throws InputError for times that are no multiple of K, nor, for such a reading,
+/// a divisor of it; and of a task for all times but those of windows.
 std::vector<EpisodeChannel> episode_channels(const RunFacts& facts,
                                              std::span<const SensorLayout> sensors,
                                              std::span<const CameraLayout> cameras,

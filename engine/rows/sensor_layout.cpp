@@ -122,6 +122,14 @@ std::string components_text(const SensorLayout& sensor, FieldForm form) {
   return "force x y z on the body [N], then x y z of its centre of pressure [m]; body axes";
 }
 
+std::string unit_text(const SensorLayout& sensor, FieldForm form) {
+  for (const RunAttribute& attribute : reading_attributes(sensor, form))
+    if (const auto* const text = std::get_if<std::string>(&attribute.value);
+        text != nullptr && attribute.name == "units")
+      return *text;
+  return "";
+}
+
 Attributes reading_attributes(const SensorLayout& s, FieldForm form) {
   if (is_picture(form)) {
     Attributes list{{"units", std::string(is_colour(form) ? "grey levels" : "m")},

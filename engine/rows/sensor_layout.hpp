@@ -48,6 +48,8 @@ void check_sensor_name(const std::string& name);
 std::vector<std::uint64_t> reading_shape(const SensorLayout& sensor, FieldForm form);
 /// Returns the name of a reading's dataset in a trajectory: "force" for a field, else the form's.
 const char* dataset_of(FieldForm form);
+/// Returns the unit of a reading: "N", "m", "1", "N, N, N, m, m, m", that of the channels' map.
+std::string unit_text(const SensorLayout& sensor, FieldForm form);
 /// Describes the components of a reading: "f.axis0, f.axis1; f is the force on the body".
 std::string components_text(const SensorLayout& sensor, FieldForm form);
 

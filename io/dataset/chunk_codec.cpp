@@ -6,6 +6,7 @@
 #include <lz4.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <functional>
 #include <memory>
@@ -118,23 +119,39 @@ std::vector<unsigned char> lz4(const std::vector<unsigned char>& plain) {
   return out;
 }
 
-/// Pictures in colours and numbers of bodies are nowhere zero, so they have no tiles.
+/// Cuts a field into tiles. The last dimension, a point's numbers, stays whole.
+std::vector<std::uint64_t> field_tile(const std::vector<std::uint64_t>& field) {
+  std::vector<std::uint64_t> tile = field;
+  const std::size_t tiled = field.size() - 1;
+  const std::uint64_t side = tiled == 1 ? kTilePoints
+                             : *std::max_element(field.begin(), field.end()) < kLargeSide
+                                 ? kTileSide
+                                 : 2 * kTileSide;
+  for (std::size_t k = 0; k < tiled; ++k) tile[k] = tile_side(field[k], side);
+  return tile;
+}
+
+/// Pictures in colours and numbers of bodies are nowhere zero, so they have no tiles. `window`:
+/// readings of a row, which are as large as one another.
 ChunkPlan chunk_plan(const DatasetLayout& layout, const std::vector<std::uint64_t>& shape,
-                     std::size_t own, double together) {
+                     std::size_t own, double together, int window = 1) {
   const std::size_t row_bytes = numbers_of(shape) * number_bytes(layout, own);
   if (layout.as_jpeg(shape, own)) return {0, shape};
-  const bool sparse = layout.sparse && own == 0 && (shape.size() == 2 || shape.size() == 3) &&
-                      row_bytes >= kLeastTiledBytes;
+  const std::vector<std::uint64_t> field(shape.begin() + (window > 1 ? 1 : 0), shape.end());
+  const bool sparse = layout.sparse && own == 0 && (field.size() == 2 || field.size() == 3) &&
+                      row_bytes / static_cast<std::size_t>(window) >= kLeastTiledBytes;
   ChunkPlan plan;
   plan.tile = shape;
+  plan.window = static_cast<std::uint64_t>(window);
   if (sparse) {
     plan.may_be_absent = true;
-    std::size_t tiled = shape.size() - 1;  // the last dimension, a point's numbers, stays whole
-    const std::uint64_t side = tiled == 1 ? kTilePoints
-                               : *std::max_element(shape.begin(), shape.end()) < kLargeSide
-                                   ? kTileSide
-                                   : 2 * kTileSide;
-    for (std::size_t k = 0; k < tiled; ++k) plan.tile[k] = tile_side(shape[k], side);
+    plan.tile = field_tile(field);
+    if (window > 1) {
+      const double bytes = static_cast<double>(numbers_of(plan.tile) * number_bytes(layout, own));
+      const std::uint64_t most =
+          static_cast<std::uint64_t>(std::max(1.0, std::floor(kTileBytes / bytes)));
+      plan.tile.insert(plan.tile.begin(), tile_side(plan.window, most));
+    }
   } else if (layout.compression == "none" || row_bytes < kLeastRowBytes) {
     return plan;
   }
@@ -151,6 +168,7 @@ ChunkPlan chunk_plan(const DatasetLayout& layout, const std::vector<std::uint64_
 std::vector<ChunkPlan> chunk_plans(const DatasetLayout& layout) {
   const std::vector<std::vector<std::uint64_t>> shapes = layout.observation_shapes();
   const std::vector<std::size_t> own_bytes = layout.observation_bytes();
+  const std::vector<int> windows = layout.observation_windows();
   double together = 0;
   for (std::size_t k = 0; k < shapes.size(); ++k)
     together += static_cast<double>(numbers_of(shapes[k]) * number_bytes(layout, own_bytes[k]));
@@ -158,7 +176,7 @@ std::vector<ChunkPlan> chunk_plans(const DatasetLayout& layout) {
   std::vector<ChunkPlan> plans;
   plans.reserve(shapes.size() + samples.size());
   for (std::size_t k = 0; k < shapes.size(); ++k)
-    plans.push_back(chunk_plan(layout, shapes[k], own_bytes[k], together));
+    plans.push_back(chunk_plan(layout, shapes[k], own_bytes[k], together, windows[k]));
   for (const DatasetSample& sample : samples)
     plans.push_back(chunk_plan(layout, sample.shape, sample.own_bytes, 1));
   return plans;

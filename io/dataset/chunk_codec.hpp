@@ -22,6 +22,8 @@ struct ChunkPlan {
   std::vector<std::uint64_t> tile;  ///< the part of a row in a chunk, or a row's shape
   bool may_be_absent = false;       ///< chunks of only zeros are left out
   bool last_row = false;            ///< the one row of final_obs is cut, too
+  /// Readings of a row, over which the first dimension of the shape and of `tile` goes; 1: none.
+  std::uint64_t window = 1;
 };
 
 /// Returns one plan per observation. An observation is contiguous if neither compression nor

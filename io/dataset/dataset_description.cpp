@@ -113,6 +113,20 @@ void describe_samples(const h5::Id& scene, const DatasetLayout& layout) {
   }
 }
 
+/// Windows of readings, and the steps between two of them.
+void describe_windows(const h5::Id& scene, const DatasetLayout& layout) {
+  std::vector<std::string> names;
+  std::vector<std::int64_t> every;
+  for (const EpisodeChannel& channel : layout.channels()) {
+    if (!channel.requested || channel.window == 1) continue;
+    names.push_back(channel.name);
+    every.push_back(layout.every / channel.window);
+  }
+  if (names.empty()) return;
+  h5::write_attribute(scene, "windows", std::span<const std::string>(names));
+  h5::write_list<std::int64_t>(scene, "window_every", every);
+}
+
 void describe_numbers(const h5::Id& scene, const DatasetLayout& layout) {
   const auto texts = [&](const char* name, const std::vector<std::string>& list) {
     h5::write_attribute(scene, name, std::span<const std::string>(list));
@@ -121,6 +135,7 @@ void describe_numbers(const h5::Id& scene, const DatasetLayout& layout) {
   h5::write_attribute(scene, "observation_type", layout.single ? "float32" : "float64");
   texts("observations", layout.observation_names());
   describe_samples(scene, layout);
+  describe_windows(scene, layout);
   texts("q_names", layout.q_names);
   texts("q_units", layout.q_units);
   texts("v_names", layout.v_names);
@@ -149,8 +164,10 @@ void describe_numbers(const h5::Id& scene, const DatasetLayout& layout) {
     std::vector<std::string> readings, components;
     for (const EpisodeChannel& channel : channels) {
       const FieldOutput of = channel.reading;
-      if (channel.kind != EpisodeChannel::Kind::reading || of.form == FieldForm::field ||
-          is_view(of.form) || &layout.sensors[static_cast<std::size_t>(of.sensor)] != &sensor)
+      // The field of a scene's sensor has its name; of a task another observation may have it.
+      if (channel.kind != EpisodeChannel::Kind::reading ||
+          (of.form == FieldForm::field && !layout.task) || is_view(of.form) ||
+          &layout.sensors[static_cast<std::size_t>(of.sensor)] != &sensor)
         continue;
       readings.push_back(channel.name);
       components.push_back(components_text(sensor, of.form));
@@ -331,6 +348,26 @@ std::vector<StoredSample> stored_samples(const h5::Id& scene, std::int64_t every
                                 names[k], steps[k], every));
     const OutputTimes times{steps[k] / every, steps[k] == 0};
     list.push_back({names[k], times, times.before(rows + 1, rows)});
+  }
+  return list;
+}
+
+std::vector<StoredWindow> stored_windows(const h5::Id& scene, std::int64_t every) {
+  std::vector<StoredWindow> list;
+  if (H5Aexists(scene.get(), "windows") <= 0) return list;
+  const std::vector<std::string> names = h5::read_texts(scene, "windows"),
+                                 stored = h5::read_texts(scene, "observations");
+  const std::vector<std::int64_t> steps = h5::read_numbers<std::int64_t>(scene, "window_every");
+  if (steps.size() != names.size())
+    throw IoError(
+        fmt::format("its 'window_every' has {} numbers; expected {}", steps.size(), names.size()));
+  for (std::size_t k = 0; k < names.size(); ++k) {
+    if (steps[k] < 1 || steps[k] >= every || every % steps[k] != 0)
+      throw IoError(fmt::format("its '{}' is read every {} steps; expected a divisor of {}",
+                                names[k], steps[k], every));
+    if (std::find(stored.begin(), stored.end(), names[k]) == stored.end())
+      throw IoError(fmt::format("its 'windows' name '{}'; expected stored observations", names[k]));
+    list.push_back({names[k], every / steps[k]});
   }
   return list;
 }

@@ -55,6 +55,15 @@ struct StoredSample {
 std::vector<StoredSample> stored_samples(const h5::Id& scene, std::int64_t every,
                                          std::int64_t rows);
 
+/// A reading of which each row has a window, evenly spaced in time, the last one at the row.
+struct StoredWindow {
+  std::string name;
+  std::int64_t readings = 0;  ///< of a row: the first dimension of its shape
+};
+/// Returns them in the order of the file; most have none. `every`: steps of a row. Throws IoError
+/// for steps that are no divisor of it, and for names that are not stored.
+std::vector<StoredWindow> stored_windows(const h5::Id& scene, std::int64_t every);
+
 /// Returns the stored observations that are touch. Throws IoError if /scene has no such list.
 std::vector<std::string> stored_touch(const h5::Id& scene);
 

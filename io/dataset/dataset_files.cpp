@@ -92,17 +92,9 @@ std::vector<std::string> differences_of(const std::string& file,
 void add_shape(const h5::Id& group, const std::string& name, const std::string& prefix,
                DatasetSummary& summary) {
   const h5::Id dataset = h5::open_dataset(group, name);
-  const h5::Id type(H5Dget_type(dataset.get()));
-  const std::size_t bits = 8 * H5Tget_size(type.get());
-  const H5T_class_t kind = H5Tget_class(type.get());
-  const std::string word =
-      kind == H5T_ENUM     ? "bool"
-      : kind == H5T_STRING ? fmt::format("files of up to {} bytes", bits / 8)
-      : kind == H5T_FLOAT
-          ? fmt::format("float{}", bits)
-          : fmt::format("{}int{}", H5Tget_sign(type.get()) == H5T_SGN_NONE ? "u" : "", bits);
   summary.shapes.emplace_back(
-      prefix + name, fmt::format("({}) {}", fmt::join(h5::dimensions(dataset), ", "), word));
+      prefix + name,
+      fmt::format("({}) {}", fmt::join(h5::dimensions(dataset), ", "), h5::type_text(dataset)));
 }
 
 void add_shapes(const h5::Id& group, const std::string& prefix, int depth,

@@ -153,6 +153,13 @@ std::vector<std::vector<std::uint64_t>> DatasetLayout::observation_shapes() cons
   return shapes;
 }
 
+std::vector<int> DatasetLayout::observation_windows() const {
+  std::vector<int> windows;
+  for (const EpisodeChannel& channel : channels())
+    if (channel.requested && !channel.times.given()) windows.push_back(channel.window);
+  return windows;
+}
+
 std::vector<std::size_t> DatasetLayout::observation_bytes() const {
   std::vector<std::size_t> bytes;
   for (const EpisodeChannel& channel : channels())

@@ -98,6 +98,8 @@ struct DatasetLayout : RunFacts {
   [[nodiscard]] std::vector<std::size_t> touch() const;
   /// Shapes of one row of each stored observation: {nq}, {nv}, {n, 3}, {rows, cols, 3} …
   [[nodiscard]] std::vector<std::vector<std::uint64_t>> observation_shapes() const;
+  /// Readings of a row of each stored observation: 1, or a window, which its shape begins with.
+  [[nodiscard]] std::vector<int> observation_windows() const;
   /// Whether an observation is stored as JPEG files. `own`: its EpisodeChannel::own_bytes().
   [[nodiscard]] bool as_jpeg(const std::vector<std::uint64_t>& shape, std::size_t own) const {
     return jpeg_quality > 0 && own == 1 && shape.size() == 3 && shape[2] == 3;

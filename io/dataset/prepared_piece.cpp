@@ -56,31 +56,40 @@ void add_sample(const DemoFormat& format, const EpisodeRows& piece, int episode,
                      bytes_at(piece, sample.source) + as_size(episode) * as_size(count) * bytes};
 }
 
-/// Layout of a dataset's rows: height × width cells each. A cell is a point of a field, or the
-/// whole row.
+/// Layout of a dataset's rows: `readings` of height × width cells each. A cell is a point of a
+/// field, or the whole row.
 struct Cells {
-  std::size_t height = 1, width = 1, bytes = 0;  ///< of a cell
-  std::size_t tile_height = 1, tile_width = 1;
+  std::size_t readings = 1, height = 1, width = 1, bytes = 0;  ///< of a cell
+  std::size_t tile_readings = 1, tile_height = 1, tile_width = 1;
   std::size_t rank = 0;  ///< of the tiles: 0 whole rows, 1 parts of a list, 2 of an image
 
   Cells(const std::vector<std::uint64_t>& shape, const ChunkPlan& plan, std::size_t row_bytes)
       : bytes(row_bytes) {
     if (!plan.may_be_absent) return;
-    rank = shape.size() - 1;
-    width = shape[rank - 1];
-    tile_width = plan.tile[rank - 1];
+    const std::size_t field = plan.window > 1 ? 1 : 0;  // where the shape of a field begins
+    if (plan.window > 1) readings = shape[0], tile_readings = plan.tile[0];
+    rank = shape.size() - field - 1;
+    width = shape[field + rank - 1];
+    tile_width = plan.tile[field + rank - 1];
     if (rank == 2) {
-      height = shape[0];
-      tile_height = plan.tile[0];
+      height = shape[field];
+      tile_height = plan.tile[field];
     }
-    bytes = row_bytes / (height * width);
+    bytes = row_bytes / (readings * height * width);
   }
-  [[nodiscard]] std::size_t row_bytes() const { return height * width * bytes; }
-  [[nodiscard]] std::size_t tile_bytes() const { return tile_height * tile_width * bytes; }
-  [[nodiscard]] std::array<std::uint64_t, 3> first(std::int64_t row, std::size_t r,
-                                                   std::size_t c) const {
-    if (rank == 2) return {static_cast<std::uint64_t>(row), r, c};
-    return {static_cast<std::uint64_t>(row), c, 0};
+  [[nodiscard]] std::size_t line_bytes() const { return width * bytes; }
+  [[nodiscard]] std::size_t row_bytes() const { return readings * height * line_bytes(); }
+  [[nodiscard]] std::size_t tile_bytes() const {
+    return tile_readings * tile_height * tile_width * bytes;
+  }
+  [[nodiscard]] std::array<std::uint64_t, 4> first(std::int64_t row, std::size_t reading,
+                                                   std::size_t r, std::size_t c) const {
+    std::array<std::uint64_t, 4> place{static_cast<std::uint64_t>(row)};
+    std::size_t at = 0;
+    if (readings > 1) place[++at] = reading;
+    if (rank == 2) place[++at] = r;
+    place[++at] = c;
+    return place;
   }
 };
 
@@ -112,7 +121,7 @@ class Cutter {
       chunks_.push_back(
           {episode,
            dataset,
-           {static_cast<std::uint64_t>(slice.first + row), 0, 0},
+           {static_cast<std::uint64_t>(slice.first + row)},
            compressed(layout_, format_.number_bytes(dataset), slice.data + as_size(row) * bytes,
                       used * bytes, as_size(each) * bytes)});
     }
@@ -129,30 +138,37 @@ class Cutter {
               .subspan(as_size(row))
               .first(as_size(std::min(each, slice.rows.rows - row)));
       const unsigned char* const data = slice.data + as_size(row) * cells.row_bytes();
-      mark_tiles(cells, data, content.size());
-      auto mark = marked_.begin();
-      for (std::size_t r = 0; r < cells.height; r += cells.tile_height)
-        for (std::size_t c = 0; c < cells.width; c += cells.tile_width)
-          if (*mark++ != 0) {
-            cut_tile(cells, data, r, c, content);
-            chunks_.push_back({episode, dataset, cells.first(slice.first + row, r, c),
-                               compressed(layout_, format_.number_bytes(dataset), tile_.data(),
-                                          tile_.size(), as_size(each) * cells.tile_bytes())});
-          }
+      for (std::size_t k = 0; k < cells.readings; k += cells.tile_readings) {
+        mark_tiles(cells, data, content.size(), k);
+        auto mark = marked_.begin();
+        for (std::size_t r = 0; r < cells.height; r += cells.tile_height)
+          for (std::size_t c = 0; c < cells.width; c += cells.tile_width)
+            if (*mark++ != 0) {
+              cut_tile(cells, data, k, r, c, content);
+              chunks_.push_back({episode, dataset, cells.first(slice.first + row, k, r, c),
+                                 compressed(layout_, format_.number_bytes(dataset), tile_.data(),
+                                            tile_.size(), as_size(each) * cells.tile_bytes())});
+            }
+      }
     }
     return content_;
   }
 
  private:
-  /// Marks the tiles that are not zero in one of the rows.
-  void mark_tiles(const Cells& cells, const unsigned char* data, std::size_t rows) {
+  /// Marks the tiles of the readings from `first` on that are not zero in one of the rows.
+  void mark_tiles(const Cells& cells, const unsigned char* data, std::size_t rows,
+                  std::size_t first) {
     const std::size_t across = (cells.width + cells.tile_width - 1) / cells.tile_width,
                       down = (cells.height + cells.tile_height - 1) / cells.tile_height,
-                      line = cells.width * cells.bytes, part = cells.tile_width * cells.bytes;
+                      line = cells.line_bytes(), part = cells.tile_width * cells.bytes,
+                      readings = std::min(cells.tile_readings, cells.readings - first),
+                      lines = readings * cells.height;
     marked_.assign(across * down, 0);
-    for (std::size_t k = 0; k < rows * cells.height; ++k) {
-      const std::span<const unsigned char> whole(data + k * line, line);
-      char* const mark = marked_.data() + k % cells.height / cells.tile_height * across;
+    for (std::size_t k = 0; k < rows * lines; ++k) {
+      const std::size_t line_in_row = first * cells.height + k % lines;
+      const std::span<const unsigned char> whole(
+          data + k / lines * cells.row_bytes() + line_in_row * line, line);
+      char* const mark = marked_.data() + line_in_row % cells.height / cells.tile_height * across;
       if (!any_bit(whole)) continue;
       for (std::size_t tile = 0; tile < across; ++tile)
         if (mark[tile] == 0)
@@ -161,18 +177,23 @@ class Cutter {
     }
   }
 
-  /// Cuts the tile that begins at row r, column c, from each row. Cells outside are zero.
-  void cut_tile(const Cells& cells, const unsigned char* data, std::size_t r, std::size_t c,
-                std::span<RowContent> content) {
-    const std::size_t high = std::min(cells.tile_height, cells.height - r),
+  /// Cuts the tile that begins at reading `first`, row r, column c, from each row of the dataset.
+  /// Cells outside are zero.
+  void cut_tile(const Cells& cells, const unsigned char* data, std::size_t first, std::size_t r,
+                std::size_t c, std::span<RowContent> content) {
+    const std::size_t readings = std::min(cells.tile_readings, cells.readings - first),
+                      high = std::min(cells.tile_height, cells.height - r),
                       wide = std::min(cells.tile_width, cells.width - c) * cells.bytes;
     tile_.assign(content.size() * cells.tile_bytes(), 0);
     unsigned char* out = tile_.data();
     for (std::size_t row = 0; row < content.size(); ++row, out += cells.tile_bytes()) {
-      for (std::size_t k = 0; k < high; ++k) {
-        const std::size_t at = ((r + k) * cells.width + c) * cells.bytes;
+      for (std::size_t k = 0; k < readings * high; ++k) {
+        const std::size_t reading = k / high, line = k % high;
+        const std::size_t at =
+            (((first + reading) * cells.height + r + line) * cells.width + c) * cells.bytes;
         const std::span<const unsigned char> cut(data + row * cells.row_bytes() + at, wide);
-        std::memcpy(out + k * cells.tile_width * cells.bytes, cut.data(), wide);
+        std::memcpy(out + (reading * cells.tile_height + line) * cells.tile_width * cells.bytes,
+                    cut.data(), wide);
         content[row].sum.add(at, cut);
       }
       content[row].any =

@@ -45,7 +45,7 @@ std::vector<PieceSlice> slices_of(const DemoFormat& format, const EpisodeRows& p
 struct PreparedChunk {
   int episode = 0;  ///< in the piece
   std::size_t dataset = 0;
-  std::array<std::uint64_t, 3> first{};  ///< row, then the start of the tile
+  std::array<std::uint64_t, 4> first{};  ///< row, then the start of the tile
   std::vector<unsigned char> bytes;
 };
 

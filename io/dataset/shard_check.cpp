@@ -108,6 +108,7 @@ class ShardChecker {
       gains_ = h5::read_texts(scene_, "picture_gain_names").size();
     gradients_ = stored_gradients(scene_);
     samples_ = stored_samples(scene_, every, rows_);
+    windows_ = stored_windows(scene_, every);
   }
   /// Reads every attribute, also those that nothing else here needs.
   static void check_attributes(const h5::Id& object) {
@@ -203,6 +204,7 @@ class ShardChecker {
       add_observation(obs, names_[k], episode, k + 1, 0, rows, touch);
       add_observation(final_obs, names_[k], episode, k + 1, rows, 1);
     }
+    for (const StoredWindow& window : windows_) check_window(obs, window, episode);
     if (!touch_.empty())
       check_touching(demo, episode);
     else if (H5Aexists(demo.get(), "touching") > 0)
@@ -227,6 +229,13 @@ class ShardChecker {
     if (stored != there)
       fail(fmt::format("demo_{}: 'touching' is {}; something is felt in {} of its rows", episode,
                        stored, there));
+  }
+
+  void check_window(const h5::Id& obs, const StoredWindow& window, std::int64_t episode) {
+    const h5::Dims dims = h5::dimensions(h5::open_dataset(obs, window.name));
+    if (dims.size() < 2 || dims[1] != static_cast<hsize_t>(window.readings))
+      fail(fmt::format("demo_{}: {} has no windows of {} readings, which /scene says", episode,
+                       window.name, window.readings));
   }
 
   void add_sample(const h5::Id& samples, const StoredSample& stored, std::int64_t episode,
@@ -412,6 +421,7 @@ class ShardChecker {
   std::size_t gains_ = 0;                   // of pictures, in a demo
   std::vector<StoredGradient> gradients_;
   std::vector<StoredSample> samples_;
+  std::vector<StoredWindow> windows_;
   bool single_ = false, is_task_ = false;
   std::int64_t rows_ = 0, end_ = 0, policies_ = 0;
   std::tuple<std::vector<float>, std::vector<double>, std::vector<std::uint8_t>,

@@ -72,6 +72,18 @@ std::string attribute_text(const Id& object, const std::string& name) {
       fmt::format("attribute '{}' of {} is neither text nor numbers", name, place_of(object)));
 }
 
+std::string type_text(const Id& dataset) {
+  const Id type(H5Dget_type(dataset.get()));
+  const std::size_t bytes = H5Tget_size(type.get());
+  switch (H5Tget_class(type.get())) {
+    case H5T_ENUM: return "bool";
+    case H5T_STRING: return fmt::format("files of up to {} bytes", bytes);
+    case H5T_FLOAT: return fmt::format("float{}", 8 * bytes);
+    default:
+      return fmt::format("{}int{}", H5Tget_sign(type.get()) == H5T_SGN_NONE ? "u" : "", 8 * bytes);
+  }
+}
+
 bool is_dataset(const Id& parent, const std::string& name) {
   const Quiet quiet;
   const Id object(H5Oopen(parent.get(), name.c_str(), link_access(H5P_LINK_ACCESS)));

@@ -17,6 +17,8 @@ std::vector<std::string> attribute_names(const Id& object);
 /// Returns elements separated by ", ", numbers in the fewest digits that give them back. Throws
 /// IoError.
 std::string attribute_text(const Id& object, const std::string& name);
+/// Returns the type of a dataset's numbers: "float32", "uint8", "bool", "files of up to 9 bytes".
+std::string type_text(const Id& dataset);
 /// Whether a link leads to a dataset, not to a group.
 [[nodiscard]] bool is_dataset(const Id& parent, const std::string& name);
 

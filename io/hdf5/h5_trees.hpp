@@ -16,7 +16,7 @@ namespace tangere::h5 {
 
 /// A chunk on disk, all filters applied.
 struct FileChunk {
-  std::array<std::uint64_t, 3>
+  std::array<std::uint64_t, 4>
       first{};  ///< its first number's place in the first dimensions; 0 in the others
   std::uint64_t address = 0;
   std::uint32_t bytes = 0;

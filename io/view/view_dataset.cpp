@@ -103,12 +103,12 @@ class DatasetView {
                every = h5::read_number<std::int64_t>(scene, "every");
     if (every < 1) throw IoError(fmt::format("{}: a row every {} steps", path_, every));
     const std::vector<StoredSample> samples = stored_samples(scene, every, steps / every);
-    // The observations of a task have names of their own, which may be those of sensors.
-    const bool is_task = !value_of(dataset_.settings, "policy").empty();
+    const std::vector<StoredWindow> windows = stored_windows(scene, every);
     for (ViewSensor& sensor : scene_->sensors()) {
       std::string name;
       for (const std::string& reading : {sensor.name, sensor.name + ".ideal"})
-        if (!is_task && name.empty() && h5::has_link(obs, reading)) name = reading;
+        if (name.empty() && h5::has_link(obs, reading) && is_reading(scene, sensor.name, reading))
+          name = reading;
       std::optional<StoredSample> sampled;
       for (const StoredSample& sample : samples)
         if (name.empty() && (sample.name == sensor.name || sample.name == sensor.name + ".ideal"))
@@ -122,8 +122,23 @@ class DatasetView {
       signs_.push_back(static_cast<int>(h5::read_number<std::int64_t>(group, "pressure_sign")));
       readings_.push_back(name);
       sampled_.push_back(sampled);
+      const auto window = std::find_if(windows.begin(), windows.end(),
+                                       [&](const StoredWindow& each) { return each.name == name; });
+      windows_.push_back(window == windows.end() ? 1 : window->readings);
       data_.sensors.push_back(std::move(sensor));
     }
+  }
+
+  /// Whether an observation is a reading of a sensor. Those of a task have names of their own,
+  /// which may be those of sensors.
+  [[nodiscard]] bool is_reading(const h5::Id& scene, const std::string& sensor,
+                                const std::string& name) const {
+    if (value_of(dataset_.settings, "policy").empty()) return true;
+    if (!h5::has_link(scene, "sensors")) return false;
+    const h5::Id group = h5::open_group(h5::open_group(scene, "sensors"), sensor);
+    if (H5Aexists(group.get(), "readings") <= 0) return false;
+    const std::vector<std::string> readings = h5::read_texts(group, "readings");
+    return std::find(readings.begin(), readings.end(), name) != readings.end();
   }
 
   /// Lists the pictures in colours: observations of bytes, (rows, height, width, 3).
@@ -239,17 +254,18 @@ class DatasetView {
   }
 
   /// Takes the newest field at each frame, once: rows of obs, then final_obs; of a sensor that is
-  /// not read at every row, its samples.
+  /// not read at every row, its samples; of a window, the last reading.
   void add_fields(std::size_t sensor, const Demo& which, const h5::Id& demo, ViewEpisode& episode) {
     const ViewSensor& view = data_.sensors[sensor];
     const std::optional<StoredSample>& sampled = sampled_[sensor];
-    const std::size_t width = 3 * static_cast<std::size_t>(view.points);
+    const std::size_t width = 3 * static_cast<std::size_t>(view.points),
+                      readings = static_cast<std::size_t>(windows_[sensor]);
     const auto open = [&](const char* group, std::int64_t rows) {
       h5::Id fields = h5::open_dataset(h5::open_group(demo, group), readings_[sensor]);
       const h5::Dims dims = h5::dimensions(fields);
       std::size_t numbers = 1;
       for (std::size_t i = 1; i < dims.size(); ++i) numbers *= dims[i];
-      if (dims.size() < 2 || dims[0] != static_cast<hsize_t>(rows) || numbers != width)
+      if (dims.size() < 2 || dims[0] != static_cast<hsize_t>(rows) || numbers != readings * width)
         throw IoError(fmt::format("{}: expected {} fields of {} points: the file is damaged",
                                   h5::place_of(fields), rows, view.points));
       return fields;
@@ -266,8 +282,10 @@ class DatasetView {
       const std::int64_t newest = sampled ? sampled->times.before(row + 1, which.rows) - 1 : row;
       if (newest > taken) {
         const bool at_end = !sampled && row == which.rows;
-        const std::vector<double> force =
-            row_numbers(at_end ? last : fields, at_end ? 0 : newest, width);
+        const std::vector<double> row_fields =
+            row_numbers(at_end ? last : fields, at_end ? 0 : newest, readings * width);
+        const std::vector<double> force(row_fields.end() - static_cast<std::ptrdiff_t>(width),
+                                        row_fields.end());
         check_finite_field(force, fmt::format("{}: demo_{}: sensor '{}': row {}", which.file,
                                               which.number, view.name, newest));
         sums = add_field(view, signs_[sensor], force, field);
@@ -302,6 +320,7 @@ class DatasetView {
   ViewData data_;
   std::vector<std::string> q_names_, randomized_, readings_;
   std::vector<std::optional<StoredSample>> sampled_;   // (sensors) those that are not in every row
+  std::vector<std::int64_t> windows_;                  // (sensors) readings of a row
   std::vector<std::optional<StoredSample>> pictures_;  // those that are not in every row
   int every_picture_ = 1;
   std::vector<int> signs_;

@@ -7,6 +7,7 @@ has
     observations  of row j n
     touch         of rows (j - 1) n + 1 … j n, the newest last: (n, …). Rows before the first repeat
                   the first one
+                  the first one. Where rows are windows of k readings already: (n k, …)
     action        of all n rows, which must be the same
     reward        the sum of those of the n rows
     done, success true in the last frame of an episode
@@ -16,6 +17,7 @@ Arrays are those of the files, without a change of type or unit.
 
 from __future__ import annotations
 
+import re
 from typing import Any, Sequence
 
 import numpy as np
@@ -24,6 +26,8 @@ from . import _core
 from .data import Episodes
 
 Arrays = dict[str, np.ndarray]
+
+_SIZE = re.compile(r"(body|joint) .*(size|radius|length|pos|quat)")  # of shapes, places
 
 
 class Frames:
@@ -67,6 +71,28 @@ class Frames:
         """Of an episode, for messages."""
         return f"{self.episodes.path}: {self.episodes.names[self.chosen[place]]}"
 
+    def scene_note(self) -> dict[str, Any]:
+        """What `tangere view` needs beside the numbers of an export; empty without q."""
+        episodes, said = self.episodes, self.episodes.attributes
+        if "q" not in episodes.keys:
+            return {}
+        first = episodes.arrays(self.chosen[0], ["q"])["q"][0]
+        note: dict[str, Any] = {
+            "name": str(said["name"]), "text": str(said["text"]),
+            "q_names": [str(name) for name in said["q_names"]],
+            "q_start": [float(x) for x in first],
+            "sensors": {
+                name: {"pressure_sign": int(about["pressure_sign"]), "points": _points(about)}
+                for name, about in episodes.sensors.items()
+            },
+        }  # fmt: skip
+        drawn = [name for name in map(str, said.get("randomized_names", ())) if _SIZE.match(name)]
+        if drawn:
+            values = (episodes.randomized(i) for i in self.chosen)
+            note["randomized_names"] = drawn
+            note["randomized"] = [[of[name] for name in drawn] for of in values]
+        return {"scene": note}
+
     def is_touch(self, key: str) -> bool:
         """Whether an observation is a reading of a sensor and no picture in colours."""
         episodes = self.episodes
@@ -74,9 +100,26 @@ class Frames:
             return False
         return key in episodes.touch or key.split(".")[0] in episodes.sensors
 
+    def has_window(self, key: str) -> bool:
+        """Whether a frame has several readings, along the first axis of its shape."""
+        return key in self.episodes.windows or (self.window > 1 and self.is_touch(key))
+
+    @property
+    def windows(self) -> dict[str, dict[str, float]]:
+        """KEY → count of the readings of a frame, and the time between two of them [s]."""
+        apart = self.seconds / self.window
+        return {
+            key: {
+                "readings": self.shapes[key][0],
+                "seconds": self.episodes.windows.get(key, apart),
+            }
+            for key in self.episodes.keys
+            if self.has_window(key)
+        }
+
     def pads(self, key: str) -> tuple[int, ...]:
         """The shape of a reading at one time: without the axis of a window."""
-        return self.shapes[key][1:] if self.window > 1 and self.is_touch(key) else self.shapes[key]
+        return self.shapes[key][1:] if self.has_window(key) else self.shapes[key]
 
     def pads_apart(self, key: str, rows: np.ndarray) -> np.ndarray:
         """A reading of frames (t, …) as (t, pads, *shape), with a window (t, pads, n, *shape)."""
@@ -85,7 +128,7 @@ class Frames:
         apart = by_pads(samples) if len(shape) >= 3 else samples[:, None]
         if shape == self.shapes[key]:
             return apart
-        return np.moveaxis(apart.reshape(len(rows), self.window, *apart.shape[1:]), 1, 2)
+        return np.moveaxis(apart.reshape(len(rows), -1, *apart.shape[1:]), 1, 2)
 
     def of(self, place: int) -> Arrays:
         """Observations by key, "actions", "rewards", "dones" and "success" of an episode."""
@@ -133,11 +176,19 @@ class Frames:
                 _check_held(rows, starts, n, self.name(place))
                 taken[key] = rows[starts]
             elif self.is_touch(key):
-                at = np.maximum(starts[:, None] + np.arange(1 - n, 1), 0)
-                taken[key] = np.asarray(rows)[at]
+                at = starts[:, None] + np.arange(1 - n, 1)
+                found = np.asarray(rows)[np.maximum(at, 0)]
+                if key in self.episodes.windows:
+                    found[at < 0] = rows[0][0]  # the oldest one
+                    found = found.reshape(len(found), -1, *rows.shape[2:])
+                taken[key] = found
             else:
                 taken[key] = rows[starts]
         return taken
+
+
+def _points(sensor: dict[str, Any]) -> int:
+    return int(np.prod(sensor["resolution"])) if "resolution" in sensor else int(sensor["points"])
 
 
 def _check_held(actions: np.ndarray, starts: np.ndarray, window: int, name: str) -> None:

@@ -45,7 +45,7 @@ class Ftp1(ZarrStore):
         if side not in ("left", "right"):
             raise _core.InputError(f"side {side!r}; expected left or right")
         self._text, self._sensor = task_text(frames, task), sensor
-        about = attributes_of(episodes)
+        about = attributes_of(frames)
         self._groups: dict[str, str] = {}  # group → key
         columns = {
             "timestamps": Column((), np.dtype(np.int64), {"unit": f"{frames.seconds:g} s"}),

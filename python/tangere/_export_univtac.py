@@ -30,7 +30,7 @@ import numpy as np
 from PIL import Image
 
 from . import _core
-from ._export_frames import Arrays, Frames, is_picture, picture_rows
+from ._export_frames import Arrays, Frames, is_picture, picture_rows, unit_and_meaning
 from ._export_ftp1 import joint_places
 from ._export_job import sync, write_json
 
@@ -58,7 +58,7 @@ class UniVtac:
             )
         self.fps = max(1, round(1 / frames.seconds))
         self._pixels = {  # of the pictures of each sensor
-            key.split(".")[0]: frames.shapes[key][:2]
+            key.split(".")[0]: frames.pads(key)[:2]
             for key in episodes.keys
             if key.split(".")[-1] in ("rgb", "rgb_marker", "height")
         }
@@ -71,6 +71,10 @@ class UniVtac:
         ]  # fmt: skip
         first = self._arrays(frames.of(0))
         self.names = sorted(first)
+        self.notes = [
+            f"UniVTAC has one reading a frame: of the windows of {key} the newest one is written"
+            for key in episodes.windows
+        ]
 
     def job(self) -> dict[str, Any]:
         return {
@@ -109,7 +113,10 @@ class UniVtac:
             "seconds_per_frame": frames.seconds,
             "joints": [str(episodes.attributes["q_names"][i]) for i in self._joints],
             "joint_units": [str(episodes.attributes["q_units"][i]) for i in self._joints],
+            **frames.scene_note(),
             "datasets": self.names,
+            "units": {name: unit for name in self.names if (unit := self._unit(name))},
+            **({"newest_of_window": sorted(episodes.windows)} if episodes.windows else {}),
             "episodes": [
                 {
                     "demo": episodes.names[i], "steps": int(length),
@@ -119,6 +126,15 @@ class UniVtac:
             ],
         }  # fmt: skip
         write_json(folder / "metadata.json", said)
+
+    def _unit(self, name: str) -> str:
+        units = {"press_depth": "mm", "marker": "pixels"}
+        if name == "action":
+            return str(self.frames.episodes.attributes.get("action_unit", "1"))
+        owner, _, reading = name.removeprefix("tactile/").partition("/")
+        if reading == "force":
+            return unit_and_meaning(self.frames.episodes, owner)[0]
+        return units.get(reading, "")
 
     def _is_of_sensor(self, key: str) -> bool:
         """Whether it is a reading of a sensor, or touch that a task observes."""
@@ -142,15 +158,19 @@ class UniVtac:
             elif not self._is_of_sensor(key):
                 continue
             elif not reading:
-                found[f"tactile/{owner}/force"] = arrays[key].astype(np.float32)
+                found[f"tactile/{owner}/force"] = self._newest(arrays, key).astype(np.float32)
             elif reading == "height":
-                depth = (1000 * arrays[key][..., 0]).astype(np.float32)
+                depth = (1000 * self._newest(arrays, key)[..., 0]).astype(np.float32)
                 found[f"tactile/{owner}/press_depth"] = depth
             elif reading == "markers" and owner in self._pixels:
                 found[f"tactile/{owner}/marker"] = marker_pixels(
-                    arrays[key], episodes.sensors[owner], self._pixels[owner]
+                    self._newest(arrays, key), episodes.sensors[owner], self._pixels[owner]
                 )
         return found
+
+    def _newest(self, arrays: Arrays, key: str) -> np.ndarray:
+        """The reading at each row."""
+        return arrays[key][:, -1] if self.frames.has_window(key) else arrays[key]
 
 
 def marker_pixels(moved: np.ndarray, sensor: dict[str, Any], pixels: tuple[int, ...]) -> np.ndarray:

@@ -19,8 +19,6 @@ import zarr
 
 from . import _core
 from ._export_frames import Arrays, Frames, unit_and_meaning
-from .data import Episodes
-
 _CHUNK_BYTES = 1 << 20  # of a chunk, at most, where a row is smaller
 _PART_BYTES = 1 << 26  # of the numbers of a part
 _MOST_ROWS = 4096  # of a chunk
@@ -75,6 +73,7 @@ class ZarrStore:
                 "demos": [episodes.names[i] for i in self.frames.chosen],
                 "touch": episodes.touch,
                 "privileged": episodes.privileged,
+                **self.frames.scene_note(),
             }
         )
         data = root.create_group("data")
@@ -134,7 +133,7 @@ class Zarr(ZarrStore):
                 f"{episodes.path}: an observation is called {clash[0]!r}, which the format has for "
                 "something else; expected another name of the sensor"
             )
-        about = attributes_of(episodes)
+        about = attributes_of(frames)
         sources = {key: key for key in self._keys} | self._others
         super().__init__(frames, {
             name: Column(frames.shapes[source], frames.types[source], about.get(name, {}))
@@ -146,15 +145,17 @@ class Zarr(ZarrStore):
         return {name: frames[source] for name, source in self._sources.items()}
 
 
-def attributes_of(episodes: Episodes) -> dict[str, dict[str, Any]]:
-    """NAME → what is said of an array: its unit, its meaning, names of its numbers."""
-    said: dict[str, dict[str, Any]] = {}
+def attributes_of(frames: Frames) -> dict[str, dict[str, Any]]:
+    """NAME → what is said of an array: its unit, its meaning, names of its numbers, its window."""
+    episodes, said = frames.episodes, dict[str, dict[str, Any]]()
     for key in episodes.keys:
         unit, meaning = unit_and_meaning(episodes, key)
         said[key] = {name: text for name, text in (("unit", unit), ("meaning", meaning)) if text}
         if key in ("q", "v"):
             for what in ("names", "units"):
                 said[key][what] = [str(x) for x in episodes.attributes[f"{key}_{what}"]]
+    for key, window in frames.windows.items():
+        said[key]["window"] = window
     said["action"] = {
         "names": [str(name) for name in episodes.attributes["action_names"]],
         "unit": str(episodes.attributes.get("action_unit", "1")),

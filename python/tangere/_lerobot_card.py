@@ -6,18 +6,18 @@ from __future__ import annotations
 import json
 from typing import Any, Sequence
 
-from ._export_frames import unit_and_meaning
+from ._export_frames import Frames, unit_and_meaning
 from ._lerobot_features import Feature
 from .data import Episodes
 
 
 def card(
-    episodes: Episodes, features: Sequence[Feature], info: dict[str, Any], text: str,
-    successes: int, license: str, window: int,
+    frames: Frames, features: Sequence[Feature], info: dict[str, Any], text: str,
+    successes: int, license: str,
 ) -> str:  # fmt: skip
     """The text of the file. `info` is that of meta/info.json."""
+    episodes = frames.episodes
     said = episodes.attributes
-    seconds = float(said["timestep"]) * int(said["every"])
     title = episodes.task or str(said["name"])
     tags = ["LeRobot", "tangere", "tactile", "simulation", title]
     solved = f" Success ends {successes} of them." if episodes.task else ""
@@ -35,9 +35,9 @@ def card(
         f"{text}. Simulated by Tangere, written as LeRobotDataset {info['codebase_version']}.",
         "",
         f"- {info['total_episodes']} episodes with {info['total_frames']} frames.{solved}",
-        f"- A frame is one action, which lasts {seconds * window:g} s. Time stamps are multiples "
+        f"- A frame is one action, which lasts {frames.seconds:g} s. Time stamps are multiples "
         f"of 1/{info['fps']} s. A step of the simulation takes {float(said['timestep']):g} s.",
-        *_window(window, seconds),
+        *_windows(frames),
         f"- Numbers are float32 in SI units. Pictures are {_pictures(features)}.",
         "",
         "## Columns",
@@ -58,13 +58,15 @@ def card(
     return "\n".join(lines) + "\n"
 
 
-def _window(window: int, seconds: float) -> list[str]:
-    if window == 1:
-        return []
+def _windows(frames: Frames) -> list[str]:
+    kinds: dict[tuple[float, float], list[str]] = {}
+    for key, window in frames.windows.items():
+        kinds.setdefault((window["readings"], window["seconds"]), []).append(f"`{key}`")
     return [
-        f"- Readings of sensors have {window} samples a frame along their first axis, {seconds:g} "
-        "s apart, the last one at the time of the frame. Before an episode begins they repeat its "
+        f"- {', '.join(keys)}: {readings:g} samples a frame along the first axis, {seconds:g} s "
+        "apart, the last one at the time of the frame. Before an episode begins they repeat its "
         "first sample."
+        for (readings, seconds), keys in kinds.items()
     ]
 
 

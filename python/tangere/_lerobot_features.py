@@ -216,11 +216,12 @@ def _joined(
 
 def _check_window(frames: Frames, felt: Sequence[str], touch: Touch | None) -> None:
     """Raises InputError where a window of touch has no form that a policy reads."""
-    for key in felt if frames.window > 1 else []:
+    for key in filter(frames.has_window, felt):
         if touch == "image" or len(frames.pads(key)) < 3:
             raise _core.InputError(
                 f"{frames.episodes.path}: touch {touch!r} of {key!r}, {frames.pads(key)}, with a "
-                f"window of {frames.window}; expected touch 'state' of rows and columns, or none"
+                f"window of {frames.shapes[key][0]}; expected touch 'state' of rows and columns, "
+                "or none"
             )
 
 

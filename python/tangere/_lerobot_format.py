@@ -11,7 +11,7 @@ import numpy as np
 import pyarrow as pa
 
 from . import _core, _lerobot_video
-from ._export_frames import Frames
+from ._export_frames import Frames, unit_and_meaning
 from ._export_job import sync, write_json, write_text
 from ._lerobot_card import card
 from ._lerobot_features import BOOKKEEPING, Feature, Pictures, Touch, features_of
@@ -147,7 +147,7 @@ class LeRobot:
         write_task(folder, self.text)
         info = self._info([*self.features, *bookkeeping])
         solved = len(frames.solved & set(frames.chosen))
-        text = card(episodes, self.features, info, self.text, solved, self._license, frames.window)
+        text = card(frames, self.features, info, self.text, solved, self._license)
         write_text(folder / "README.md", text)
         write_json(folder / "meta/stats.json", overall)
         write_json(folder / "meta/tangere.json", self._origin())
@@ -208,14 +208,27 @@ class LeRobot:
             "tangere_version": str(episodes.attributes["tangere_version"]),
             "seconds_per_action": frames.seconds,
             "window": frames.window,
+            **({"windows": frames.windows} if frames.windows else {}),
             "demos": [episodes.names[i] for i in frames.chosen],
             "observation_scale": episodes.scale,
             "privileged": episodes.privileged,
             "touch": episodes.touch,
             "task": episodes.task,
             "text": self.text,
+            "units": self._units(),
+            **frames.scene_note(),
             "columns": [feature.recipe() for feature in self.features],
         }
+
+    def _units(self) -> dict[str, str]:
+        """Of columns whose numbers have one unit."""
+        episodes = self.frames.episodes
+        units = {"action": str(episodes.attributes.get("action_unit", "1"))}
+        for feature in self.features:
+            found = {unit_and_meaning(episodes, key)[0] for key in feature.keys}
+            if feature.name.startswith("observation.") and not feature.is_picture:
+                units[feature.name] = found.pop() if len(found) == 1 else ""
+        return {name: unit for name, unit in units.items() if unit}
 
 
 class _Bookkeeping:

@@ -12,6 +12,9 @@ import numpy as np
 from . import _core
 
 
+_EXPORTS = ("meta/tangere.json", ".zattrs", "metadata.json")  # each in one of the formats
+
+
 class Page:
     """A page on which a run moves (docs/view.md). A notebook shows it in a cell."""
 
@@ -38,7 +41,7 @@ def view(
     frames: int = 1000,
     height: int = 600,
 ) -> Page:
-    """Shows a run: what `Batch.run()` returned, a trajectory file or a data set.
+    """Shows a run: what `Batch.run()` returned, a trajectory file, a data set or an export.
 
         run = batch.run(u, every=10, fields=["pad"])
         tangere.view(run)                      # in a notebook; or .save("run.html")
@@ -57,6 +60,10 @@ def view(
     if not isinstance(run, _core.Run):
         if envs is not None:
             raise _core.InputError("envs of a file; expected a run of Batch.run()")
+        if any((Path(run) / name).is_file() for name in _EXPORTS):
+            from . import _view_export  # h5py and the library of the format
+
+            return Page(_view_export.page(run, episodes=episodes, frames=frames)[0], height)
         return Page(_core.view_file(run, None, episodes, frames), height)
     count = run.q.shape[1]
     chosen = list(range(min(episodes, count))) if envs is None else [int(e) for e in envs]

@@ -36,6 +36,9 @@ class Episodes:
     file. Large fields in tiles and compressed ones are read, JPEG files become pictures, and up to
     256 MB are kept. A process opens the files for itself, so an object may go to the workers of a
     loader.
+
+    `windows`: of observations whose rows are windows, (rows, readings, …), the newest reading last:
+    KEY → time between two readings [s].
     """
 
     def __init__(self, path: str | Path):
@@ -72,6 +75,9 @@ class Episodes:
                     self._describe(file)
                     sensors = file["scene"].get("sensors", {})
                     self.sensors = {name: dict(sensors[name].attrs) for name in sensors}
+                    for name in sensors:  # of a curved pad
+                        if "position" in sensors[name]:
+                            self.sensors[name]["points"] = len(sensors[name]["position"])
                     cameras = file["scene"].get("cameras", {})
                     self.cameras = {name: dict(cameras[name].attrs) for name in cameras}
                 self.content = (self.content + int(file.attrs.get("content_sum", 0))) % 2**64
@@ -98,6 +104,8 @@ class Episodes:
         self.scale: dict[str, Any] = {key: 1.0 for key in self.keys}
         self.privileged = [key for key in ("q", "v") if key in self.keys]
         self.touch: list[str] = []
+        steps = zip(scene.get("windows", ()), scene.get("window_every", ()))
+        self.windows = {str(key): float(scene["timestep"]) * int(every) for key, every in steps}
         if "observation_scale" in scene:  # format version 4 on
             self.scale.update(json.loads(scene["observation_scale"]))
             self.privileged = json.loads(scene["privileged"])
@@ -157,6 +165,12 @@ class Episodes:
         gains = np.asarray(self._demo(episode).attrs["picture_gains"]).reshape(-1, 3)
         names = [str(name).rpartition(" ")[0] for name in self.attributes["picture_gain_names"]]
         return dict(zip(names[::3], gains, strict=True))
+
+    def randomized(self, episode: int) -> dict[str, float]:
+        """Name → what `<randomize>` drew for an episode. Empty where the scene draws nothing."""
+        names = [str(name) for name in self.attributes.get("randomized_names", ())]
+        values = self._demo(episode).attrs["randomized"] if names else ()
+        return dict(zip(names, map(float, values), strict=True))
 
     def terminated(self, episode: int) -> bool:
         """Whether the task ended the episode; False if it ran out of time, and for a scene."""
@@ -296,8 +310,8 @@ class Windows:
     before, ahead: rows before the present one, and actions from it on.
     split: a mask of robomimic.hdf5, such as "train" or "valid"; None for all episodes.
     only_success: leave out episodes that did not succeed.
-    form: of observations with a last axis of 3 and at least two before it: "stored", "image" (the
-        last axis first), or "points" (…, points, 3).
+    form: of readings with a last axis of 3 and at least two before it: "stored", "image" (the last
+        axis first), or "points" (…, points, 3). The axis of a window stays in front of the points.
     scale: "task" divides by the scales that the task declares, "standard" takes `mean` away and
         divides by `std`, "none" leaves SI units. `mean` and `std` are of the chosen episodes, or
         those of `statistics`: a validation set takes the ones of its training set.
@@ -486,8 +500,10 @@ class Windows:
         if rows.dtype != np.uint8 or scaled:
             shown = (np.asarray(rows, np.float32) - self._shift[key]) * self._factor[key]
         shape = self._of_episode(0, key).shape[1:]
-        if self.form == "stored" or len(shape) < 3 or shape[-1] != 3:
+        points = len(shape) - (key in self.episodes.windows)  # axes of a reading
+        if self.form == "stored" or points < 3 or shape[-1] != 3:
             return shown
         if self.form == "points":
-            return shown.reshape(*shown.shape[: -len(shape)], -1, 3)
+            window = shape[:1] if key in self.episodes.windows else ()
+            return shown.reshape(*shown.shape[: -len(shape)], *window, -1, 3)
         return np.moveaxis(shown, -1, -len(shape))

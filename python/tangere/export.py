@@ -55,6 +55,7 @@ class Exported:
     fps: int  #: frames a second, rounded
     seconds_per_action: float  #: of a frame; 1/fps, unless that is no whole number
     features: list[str]  #: the arrays
+    notes: list[str]  #: what the format does not have as the data set has it
 
 
 def export(
@@ -119,7 +120,7 @@ def export(
     )  # fmt: skip
     return Exported(
         str(output), to, complete, len(frames.lengths), len(frames), len(format.parts),
-        format.fps, frames.seconds, format.names,
+        format.fps, frames.seconds, format.names, getattr(format, "notes", []),
     )  # fmt: skip
 
 
@@ -158,7 +159,7 @@ def _csv(data: Any, output: Path, overwrite: bool, options: dict[str, Any]) -> E
         if value:
             raise _core.InputError(f"csv has no option {option!r}; it has episode")
     if _core.worker_from_environment()[0] > 0:
-        return Exported(str(output), "csv", False, 0, 0, 0, 0, 0, [])
+        return Exported(str(output), "csv", False, 0, 0, 0, 0, 0, [], [])
     path = data.path if isinstance(data, Episodes) else data
     words = ["export", str(path), "--csv", str(output), "--quiet"]
     said = run_command([*words, *(["--overwrite"] if overwrite else [])])
@@ -166,7 +167,7 @@ def _csv(data: Any, output: Path, overwrite: bool, options: dict[str, Any]) -> E
     seconds = float(episodes.attributes["timestep"]) * int(episodes.attributes["every"])
     return Exported(
         str(output), "csv", True, len(episodes), said["rows"], 1, max(1, round(1 / seconds)),
-        seconds, [],
+        seconds, [], [],
     )  # fmt: skip
 
 
@@ -297,7 +298,7 @@ def _report(done: Exported, as_json: bool) -> None:
 
 
 def _notes(done: Exported) -> list[str]:
-    notes = []
+    notes = [*done.notes]
     read = ("observation.state", "observation.environment_state", "observation.images.")
     if done.to == "lerobot":
         fields = [

@@ -19,8 +19,8 @@ struct EpisodeOptions {
   std::int64_t steps = 0;                 ///< of a scene's episode, a multiple of `every`
   int every = 1;  ///< K: steps for which a scene's action is held, and between observations
   std::uint64_t seed = 0;
-  /// What a scene's rows hold, by names with times in steps, as episode_channels() takes them;
-  /// none: everything except bodies.
+  /// What rows hold, by names with times in steps, as episode_channels() takes them; none: all that
+  /// a task observes, of a scene everything except bodies.
   std::vector<TimedName> record = {};
   Precision precision =
       Precision::f64;  ///< mixed: fields are computed in it, observations leave as float32

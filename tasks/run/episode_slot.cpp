@@ -23,12 +23,15 @@ EpisodeSlot<T>::EpisodeSlot(const EpisodeSource& source, const EpisodeOptions& o
     : source_(source),
       options_(options),
       piece_rows_(piece_rows(source, options)),
+      windowed_(std::any_of(source.channels.begin(), source.channels.end(),
+                            [](const EpisodeChannel& channel) { return channel.window > 1; })),
       stepper_(*source.model, source.solver),
       readout_(*source.model, options.precision),
       u_(kBlockEpisodes * as_size(source.model->nu())),
       values_(source.channels.size()),
       bytes_(source.channels.size()),
       ids_(source.channels.size()),
+      windows_(source.channels.size()),
       actions_(kBlockEpisodes * as_size(piece_rows_) * source.action),
       rewards_(source.whole ? kBlockEpisodes * as_size(piece_rows_) : 0),
       observations_(source.channels.size()) {
@@ -38,6 +41,7 @@ EpisodeSlot<T>::EpisodeSlot(const EpisodeSource& source, const EpisodeOptions& o
     if (own == 0) values_[name].resize(count);
     if (own == 1) bytes_[name].resize(count);
     if (own == 2) ids_[name].resize(count);
+    if (source.channels[name].window > 1) windows_[name].resize(kBlockEpisodes * width(name));
     if (source.channels[name].kind != Kind::reading)
       small_.resize(std::max(small_.size(), width(name)));
   }
@@ -51,6 +55,9 @@ void EpisodeSlot<T>::begin(EpisodeRange range) {
   program_->start(*batch_, 0);
   tally_.emplace(*batch_, 0, episodes);
   next_row_ = 0;
+  if (program_->opening_steps() == 0)
+    for (std::size_t name = 0; name < windows_.size(); ++name)
+      for (int k = 0; k < source_.channels[name].window; ++k) read_window(name, as_size(k));
   if (program_->opening_steps() > 0) {
     static_cast<void>(take_steps(0, program_->opening_steps(), {}));
     program_->after_row(*batch_, 0);
@@ -150,11 +157,55 @@ void EpisodeSlot<T>::observe_task(const TaskProgram& task, int row) {
     if (!playing_[as_size(e)]) continue;
     std::span<const double> rest = std::span(data.observation).subspan(as_size(e) * all, all);
     for (std::size_t name = kThird; name < source_.channels.size(); ++name) {
-      put(name, e, row, rest.first(width(name)));
+      if (source_.channels[name].kind != Kind::task) continue;
+      if (takes(name, row)) put(name, e, row, rest.first(width(name)));
       rest = rest.subspan(width(name));
     }
     playing_[as_size(e)] = data.state[as_size(e)] == EnvironmentState::running;
   }
+  for (std::size_t name = kThird; name < source_.channels.size(); ++name)
+    if (source_.channels[name].kind == Kind::reading) observe_reading(name, row);
+}
+
+template <class T>
+void EpisodeSlot<T>::observe_reading(std::size_t name, int row) {
+  const EpisodeChannel& channel = source_.channels[name];
+  if (channel.window > 1) {
+    for (int e = 0; e < batch_->environments(); ++e) {
+      const auto from = windows_[name].begin() + std::ptrdiff_t(as_size(e) * width(name));
+      std::copy_n(from, width(name), numbers(values_, name, e, row).begin());
+    }
+  } else if (channel.own_bytes() == 1) {
+    read_field<std::uint8_t>(readout_, *batch_, 0, channel.reading,
+                             [&](int e) { return numbers(bytes_, name, e, row); });
+  } else if (channel.own_bytes() == 2) {
+    read_field<std::int16_t>(readout_, *batch_, 0, channel.reading,
+                             [&](int e) { return numbers(ids_, name, e, row); });
+  } else {
+    read_field<T>(readout_, *batch_, 0, channel.reading,
+                  [&](int e) { return numbers(values_, name, e, row); });
+  }
+}
+
+/// Reads what is due after a step, which counts from the start of the episodes.
+template <class T>
+void EpisodeSlot<T>::read_windows(std::int64_t step) {
+  const auto after = static_cast<int>(step % source_.steps_per_row) + 1;  // the row before
+  for (std::size_t name = 0; name < windows_.size(); ++name) {
+    const int between = source_.steps_per_row / source_.channels[name].window;
+    if (after % between == 0) read_window(name, as_size(after / between - 1));
+  }
+}
+
+/// Reads a channel with a window into a place of it; of another channel nothing.
+template <class T>
+void EpisodeSlot<T>::read_window(std::size_t name, std::size_t place) {
+  if (windows_[name].empty()) return;
+  const EpisodeChannel& channel = source_.channels[name];
+  const std::size_t each = channel.reading_width();
+  read_field<T>(readout_, *batch_, 0, channel.reading, [&](int e) {
+    return std::span(windows_[name]).subspan(as_size(e) * width(name) + place * each, each);
+  });
 }
 
 template <class T>
@@ -162,15 +213,8 @@ void EpisodeSlot<T>::observe_scene(int row) {
   for (std::size_t name = kThird; name < source_.channels.size(); ++name) {
     const EpisodeChannel& channel = source_.channels[name];
     if (!takes(name, row)) continue;
-    if (channel.own_bytes() == 1) {
-      read_field<std::uint8_t>(readout_, *batch_, 0, channel.reading,
-                               [&](int e) { return numbers(bytes_, name, e, row); });
-    } else if (channel.own_bytes() == 2) {
-      read_field<std::int16_t>(readout_, *batch_, 0, channel.reading,
-                               [&](int e) { return numbers(ids_, name, e, row); });
-    } else if (channel.kind == Kind::reading) {
-      read_field<T>(readout_, *batch_, 0, channel.reading,
-                    [&](int e) { return numbers(values_, name, e, row); });
+    if (channel.kind == Kind::reading) {
+      observe_reading(name, row);
     } else if (channel.kind == Kind::bodies) {
       observe_bodies(name, row);
     } else {
@@ -228,6 +272,7 @@ bool EpisodeSlot<T>::take_steps(std::int64_t from, std::int64_t count,
     if (t > from || !requested) program_->controls(t, *batch_, 0, u_);
     stepper_.step(*batch_, std::span(u_).first(numbers));
     tally_->count(*batch_, t);
+    if (windowed_) read_windows(t);
     program_->after_step(t, *batch_, 0);
   }
   return true;

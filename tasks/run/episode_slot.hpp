@@ -51,6 +51,9 @@ class EpisodeSlot {
   void observe(int row);
   void observe_scene(int row);
   void observe_task(const TaskProgram& task, int row);
+  void observe_reading(std::size_t name, int row);
+  void read_windows(std::int64_t step);
+  void read_window(std::size_t name, std::size_t place);
   [[nodiscard]] bool act(int row, const std::function<bool()>& stopped);
   [[nodiscard]] bool take_steps(std::int64_t from, std::int64_t count,
                                 const std::function<bool()>& stopped);
@@ -61,6 +64,7 @@ class EpisodeSlot {
   const EpisodeSource& source_;
   const EpisodeOptions& options_;
   int piece_rows_;
+  bool windowed_;  // whether something is read within rows
   Stepper stepper_;
   Readout readout_;
   std::optional<Batch> batch_;
@@ -74,6 +78,7 @@ class EpisodeSlot {
   std::vector<std::vector<T>> values_;  // per name: (episodes, rows at which it is taken, width)
   std::vector<std::vector<std::uint8_t>> bytes_;  // the same of pictures in colours
   std::vector<std::vector<std::int16_t>> ids_;    // the same of numbers of bodies
+  std::vector<std::vector<T>> windows_;           // per name: (episodes, window, reading)
   std::vector<float> actions_;                    // (episodes, action rows, action)
   std::vector<float> rewards_;                    // of a task: (episodes, action rows)
   std::vector<Observation> observations_;

@@ -27,6 +27,14 @@ double row_bytes(const EpisodeSource& source, const EpisodeOptions& options) {
   return bytes;
 }
 
+/// Bytes of one episode's readings since the last row.
+double window_bytes(const EpisodeSource& source, const EpisodeOptions& options) {
+  double bytes = 0;
+  for (const EpisodeChannel& channel : source.channels)
+    if (channel.window > 1) bytes += static_cast<double>(channel.width() * number_bytes(options));
+  return bytes;
+}
+
 /// Rounds down to a multiple of 64, below 64 to a power of two. Chunks of such sizes are then
 /// whole.
 int whole_rows(int most) {
@@ -69,18 +77,20 @@ EpisodeSource shape_of(const Model& model, const EpisodeOptions& options) {
   EpisodeSource s;
   s.model = &model;
   s.rows = action_rows(options);
+  s.steps_per_row = options.every;
   s.action = as_size(model.nu());
   s.bounds = control_bounds(model.scene());
   s.channels = episode_channels(model, nullptr, options.record, options.every);
   return s;
 }
 
-EpisodeSource shape_of(const Task& task) {
+EpisodeSource shape_of(const Task& task, const EpisodeOptions& options) {
   EpisodeSource s;
   s.model = &task.model();
   s.rows = task.spec().horizon;
+  s.steps_per_row = task.spec().steps_per_action;
   s.action = task.spec().action.size();
-  s.channels = episode_channels(task.model(), &task.spec(), {}, 1);
+  s.channels = episode_channels(task.model(), &task.spec(), options.record, s.steps_per_row);
   s.whole = true;
   return s;
 }
@@ -103,7 +113,7 @@ EpisodeSource source_of(const Model& model, const StepperOptions& solver,
 }
 
 EpisodeSource source_of(const Task& task, const Policy& policy, const EpisodeOptions& options) {
-  EpisodeSource s = shape_of(task);
+  EpisodeSource s = shape_of(task, options);
   s.program = [&task, &policy, precision = options.precision](const Batch& batch) {
     const auto data = std::make_shared<EnvironmentData>(task, batch.environments());
     data->restart(batch);
@@ -123,7 +133,8 @@ int piece_rows(const EpisodeSource& source, const EpisodeOptions& options) {
 }
 
 double piece_bytes(const EpisodeSource& source, const EpisodeOptions& options) {
-  return row_bytes(source, options) * kBlockEpisodes * piece_rows(source, options);
+  return kBlockEpisodes *
+         (row_bytes(source, options) * piece_rows(source, options) + window_bytes(source, options));
 }
 
 }  // namespace tangere

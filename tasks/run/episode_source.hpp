@@ -30,6 +30,7 @@ struct EpisodeSource {
   /// Episodes may end at any time. Their length is then known only at the end, so their blocks
   /// leave whole and in ascending order.
   bool whole = false;
+  int steps_per_row = 1;  ///< K
   /// Makes the program for one block of a batch.
   std::function<std::unique_ptr<EpisodeProgram>(const Batch&)> program;
 };
@@ -42,7 +43,7 @@ EpisodeSource source_of(const Task& task, const Policy& policy, const EpisodeOpt
 
 /// Returns the same without a program, to compute memory sizes.
 EpisodeSource shape_of(const Model& model, const EpisodeOptions& options);
-EpisodeSource shape_of(const Task& task);
+EpisodeSource shape_of(const Task& task, const EpisodeOptions& options);
 
 /// Whether a row of an episode has the numbers of a name, and how many rows below it have.
 bool is_taken(const EpisodeSource& source, std::size_t name, std::int64_t row);

@@ -303,7 +303,7 @@ double episode_bytes(const Model& model, const EpisodeOptions& options) {
   return bytes_of(shape_of(model, options), options, 0);
 }
 double episode_bytes(const Task& task, const EpisodeOptions& options) {
-  return bytes_of(shape_of(task), options,
+  return bytes_of(shape_of(task, options), options,
                   BlockWorker::bytes(task) + kBlockEpisodes * EnvironmentData::bytes(task));
 }
 

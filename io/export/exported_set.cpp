@@ -1,0 +1,257 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the formats say of themselves: files of JSON, of Zarr the list of the ends of episodes, of
+// UniVTAC the arrays of one file of HDF5.
+#include "io/export/exported_set.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <map>
+#include <span>
+
+#include "engine/base/error.hpp"
+#include "io/export/json_file.hpp"
+#include "io/files/text_file.hpp"
+#include "io/hdf5/h5_arrays.hpp"
+
+namespace tangere {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kLargestList = std::size_t{1} << 32;
+constexpr const char* kSeconds = "seconds_per_frame";
+
+[[noreturn]] void damaged(const fs::path& file, const std::string& reason) {
+  throw IoError(fmt::format("'{}' is damaged: {}", file.string(), reason));
+}
+
+JsonFile notes_of(const fs::path& folder, const char* name, const char* format) {
+  if (!fs::is_regular_file(folder / name))
+    throw IoError(
+        fmt::format("'{}' has no {}: it is a {} that 'tangere export' did not write, or a part of "
+                    "one; expected an export of a data set",
+                    folder.string(), name, format));
+  return JsonFile((folder / name).string());
+}
+
+void add_source(const JsonFile& notes, ExportedSet& set) {
+  if (notes.has({"command"})) set.command = notes.text({"command"});
+  if (notes.has({"tangere_version"})) set.tangere_version = notes.text({"tangere_version"});
+}
+
+/// Counts files and bytes.
+void add_sizes(const fs::path& path, ExportedSet& set) {
+  if (fs::is_regular_file(path)) {
+    set.files = 1, set.bytes = fs::file_size(path);
+    return;
+  }
+  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(path))
+    if (entry.is_regular_file()) ++set.files, set.bytes += entry.file_size();
+}
+
+void check_demos(const JsonFile& notes, const ExportedSet& set) {
+  const std::size_t demos = notes.texts({"demos"}).size();
+  if (static_cast<std::int64_t>(demos) != set.episodes)
+    damaged(notes.path(), fmt::format("it names {} demos; expected {}, one for each episode", demos,
+                                      set.episodes));
+}
+
+ExportedSet read_lerobot(const fs::path& folder) {
+  const JsonFile notes = notes_of(folder, "meta/tangere.json", "LeRobot data set"),
+                 info((folder / "meta/info.json").string());
+  ExportedSet set;
+  set.format = "lerobot";
+  set.title = "LeRobotDataset " + info.text({"codebase_version"});
+  set.episodes = info.count({"total_episodes"});
+  set.frames = info.count({"total_frames"});
+  set.seconds_per_frame = notes.number({"seconds_per_action"});
+  add_source(notes, set);
+  check_demos(notes, set);
+  for (const std::string& name : info.keys_of({"features"})) {
+    ExportedArray& array = set.arrays.emplace_back();
+    array.name = name;
+    array.type = info.text({"features", name, "dtype"});
+    array.shape = info.counts({"features", name, "shape"});
+    if (notes.has({"units", name})) array.unit = notes.text({"units", name});
+  }
+  for (const char* name :
+       {"meta/stats.json", "meta/tasks.parquet", "meta/episodes/chunk-000/file-000.parquet",
+        "data/chunk-000/file-000.parquet"})
+    if (!fs::is_regular_file(folder / name))
+      throw IoError(fmt::format("'{}' has no {}; expected it in every LeRobot data set",
+                                folder.string(), name));
+  return set;
+}
+
+/// "float32" of "<f4".
+std::string type_of_zarr(const JsonFile& array) {
+  const std::string type = array.text({"dtype"});
+  const std::map<char, const char*> words{{'f', "float"}, {'i', "int"}, {'u', "uint"}};
+  if (type.size() < 3) damaged(array.path(), fmt::format("its dtype is '{}'", type));
+  if (type[1] == 'b') return "bool";
+  if (type[1] == 'U' || type[1] == 'S') return "text";
+  const auto word = words.find(type[1]);
+  if (word == words.end()) damaged(array.path(), fmt::format("its dtype is '{}'", type));
+  return fmt::format("{}{}", word->second, 8 * std::atoi(type.c_str() + 2));
+}
+
+/// The frame after the last one of each episode, which the exporter stores without compression.
+std::vector<std::int64_t> ends_of_zarr(const fs::path& folder) {
+  const fs::path place = folder / "meta/episode_ends";
+  const JsonFile about((place / ".zarray").string());
+  const std::vector<std::uint64_t> shape = about.counts({"shape"});
+  if (shape.size() != 1 || about.text({"dtype"}) != "<i8")
+    damaged(about.path(), "expected a list of int64");
+  const std::string bytes =
+      read_text_file((place / "0").string(), kLargestList, "the ends of episodes");
+  std::vector<std::int64_t> ends(bytes.size() / sizeof(std::int64_t));
+  if (bytes.size() != shape[0] * sizeof(std::int64_t))
+    damaged(place / "0",
+            fmt::format("it has {} bytes; expected {} numbers of 8 bytes", bytes.size(), shape[0]));
+  std::memcpy(ends.data(), bytes.data(), bytes.size());
+  std::int64_t before = 0;
+  for (const std::int64_t end : ends) {
+    if (end <= before) damaged(place / "0", "expected ascending ends of episodes");
+    before = end;
+  }
+  return ends;
+}
+
+ExportedSet read_zarr(const fs::path& folder) {
+  const JsonFile notes = notes_of(folder, ".zattrs", "Zarr store");
+  if (!notes.has({"tangere_version"}) || !fs::is_directory(folder / "data"))
+    throw IoError(
+        fmt::format("'{}' is a Zarr store that 'tangere export' did not write; expected "
+                    "an export of a data set",
+                    folder.string()));
+  ExportedSet set;
+  const bool is_ftp1 = fs::exists(folder / "data/sub_task_instruction");
+  set.format = is_ftp1 ? "ftp1" : "zarr";
+  set.title = is_ftp1 ? "Zarr with FTP-1's keys" : "Zarr, version 2 of the format";
+  set.seconds_per_frame = notes.number({kSeconds});
+  add_source(notes, set);
+  const std::vector<std::int64_t> ends = ends_of_zarr(folder);
+  set.episodes = std::ssize(ends);
+  set.frames = ends.empty() ? 0 : ends.back();
+  check_demos(notes, set);
+  std::vector<fs::path> places;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder / "data"))
+    if (entry.is_directory()) places.push_back(entry.path());
+  std::sort(places.begin(), places.end());
+  for (const fs::path& place : places) {
+    const JsonFile about((place / ".zarray").string());
+    std::vector<std::uint64_t> shape = about.counts({"shape"});
+    if (shape.empty() || static_cast<std::int64_t>(shape[0]) != set.frames)
+      damaged(about.path(), fmt::format("it has {} rows; expected {}, the frames of all episodes",
+                                        shape.empty() ? 0 : shape[0], set.frames));
+    ExportedArray array{"data/" + place.filename().string(),
+                        type_of_zarr(about),
+                        {shape.begin() + 1, shape.end()},
+                        ""};
+    if (fs::is_regular_file(place / ".zattrs")) {
+      const JsonFile said((place / ".zattrs").string());
+      if (said.has({"unit"})) array.unit = said.text({"unit"});
+    }
+    set.arrays.push_back(std::move(array));
+  }
+  return set;
+}
+
+ExportedSet read_univtac(const fs::path& folder) {
+  const JsonFile notes = notes_of(folder, "metadata.json", "UniVTAC data set");
+  if (!notes.has({"tangere_version"}) || !notes.has({"datasets"}))
+    throw IoError(
+        fmt::format("'{}' is a UniVTAC data set that 'tangere export' did not write; expected an "
+                    "export of a data set",
+                    folder.string()));
+  ExportedSet set;
+  set.format = "univtac", set.title = "UniVTAC, a file of HDF5 for each episode";
+  set.seconds_per_frame = notes.number({kSeconds});
+  add_source(notes, set);
+  const std::vector<std::int64_t> steps = notes.counts_of_list({"episodes"}, "steps");
+  set.episodes = std::ssize(steps);
+  for (std::size_t i = 0; i < steps.size(); ++i) {
+    set.frames += steps[i];
+    if (!fs::is_regular_file(folder / fmt::format("hdf5/{}.hdf5", i)))
+      throw IoError(fmt::format("'{}' has no hdf5/{}.hdf5; expected {} files of episodes",
+                                folder.string(), i, steps.size()));
+  }
+  if (steps.empty()) return set;
+  const fs::path first = folder / "hdf5/0.hdf5";
+  for (const h5::ArrayFacts& facts : h5::arrays_of(first.string(), notes.texts({"datasets"}))) {
+    const std::uint64_t rows = facts.dims.empty() ? 0 : facts.dims[0];
+    if (facts.dims.empty() || static_cast<std::int64_t>(rows) != steps[0])
+      damaged(first, fmt::format("'{}' has {} rows; expected {}", facts.name, rows, steps[0]));
+    ExportedArray array{facts.name, facts.type, {facts.dims.begin() + 1, facts.dims.end()}, ""};
+    if (notes.has({"units", facts.name})) array.unit = notes.text({"units", facts.name});
+    set.arrays.push_back(std::move(array));
+  }
+  return set;
+}
+
+/// A table: a line that says of what, the names of columns, a line for each row.
+std::optional<ExportedSet> read_table(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::string title, names;
+  constexpr std::string_view kBegin = "episode,row,";
+  if (!std::getline(file, title) || !title.starts_with("# ") || !std::getline(file, names) ||
+      !names.starts_with(kBegin))
+    return {};
+  ExportedSet set;
+  set.format = "csv", set.title = "table of " + title.substr(2);
+  for (std::size_t begin = kBegin.size(); begin <= names.size();) {
+    const std::size_t end = std::min(names.find(',', begin), names.size());
+    set.arrays.push_back({names.substr(begin, end - begin), "number", {}, ""});
+    begin = end + 1;
+  }
+  const auto columns = std::ssize(set.arrays) + 2;
+  std::string line, last;
+  for (std::int64_t number = 3; std::getline(file, line); ++number) {
+    if (std::count(line.begin(), line.end(), ',') + 1 != columns || line.empty())
+      damaged(path, fmt::format("line {} has {} columns; expected {}", number,
+                                std::count(line.begin(), line.end(), ',') + 1, columns));
+    const std::string episode = line.substr(0, line.find(','));
+    if (episode != last) ++set.episodes, last = episode;
+    ++set.frames;
+  }
+  return set;
+}
+
+/// Whether a folder has shards, and so is a data set whatever else lies there.
+bool has_shards(const fs::path& folder) {
+  std::error_code none;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, none))
+    if (entry.path().filename().string().starts_with("shard-")) return true;
+  return false;
+}
+
+}  // namespace
+
+std::optional<ExportedSet> find_export(const std::string& path) {
+  const fs::path place(path);
+  std::error_code none;
+  std::optional<ExportedSet> set;
+  if (has_shards(place)) return {};
+  if (fs::is_directory(place / ".parts", none))
+    throw IoError(fmt::format(
+        "'{}' is an export that is not complete; 'tangere export … --resume' goes on with it",
+        path));
+  if (fs::is_regular_file(place / "meta/info.json", none)) {
+    set = read_lerobot(place);
+  } else if (fs::is_regular_file(place / ".zgroup", none)) {
+    set = read_zarr(place);
+  } else if (fs::is_directory(place / "hdf5", none)) {
+    set = read_univtac(place);
+  } else if (place.extension() == ".csv" && fs::is_regular_file(place, none)) {
+    set = read_table(place);
+  }
+  if (set) add_sizes(place, *set);
+  return set;
+}
+
+}  // namespace tangere
