@@ -7,10 +7,10 @@
     python learning/pictures.py out/inserts --task insertion --see flow
 
 The tasks are those of picture_tasks.py: pads with gels and cameras. A rule plays the task once and
-stores what all of them see. A clone has one network whatever it sees: every kind is cut into 13 × 10
-patches, which become 16 numbers each, summed over kinds; then come two layers of 256. In insertion
-it has four rows of history, and the actions between them. It learns from the episodes that
-succeeded and plays 1000 fresh ones. It needs h5py.
+stores what all of them see. A clone has one network whatever it sees: every kind is cut into
+13 × 10 patches, which become 16 numbers each, summed over kinds; then come two layers of 256. In
+insertion it has four rows of history, and the actions between them. It learns from the episodes
+that succeeded and plays 1000 fresh ones. It needs h5py.
 """
 
 from __future__ import annotations
