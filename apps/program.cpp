@@ -129,8 +129,8 @@ int guarded(const Program& program, int argc, char** argv, const std::function<i
   const char* reason = "a failure that it could not handle";
   int code = kInputOutput;
   try {
-    if (const std::exception_ptr failure = std::current_exception())
-      std::rethrow_exception(failure);
+    // Not std::rethrow_exception: it allocates, and ends in this handler again where it cannot.
+    if (std::current_exception() != nullptr) throw;
   } catch (const std::bad_alloc&) {
     reason = "out of memory; ask for fewer environments";
     code = kUsage;

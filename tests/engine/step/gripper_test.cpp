@@ -138,7 +138,7 @@ TEST(Gripper, HoldsOrLetsGoAsTheClosedFormSays) {
     const double mass = mass_properties(Shape{object.mesh}, 600).mass, weight = mass * 9.81;
     const double enough = weight / (2 * 0.5);
     int lost = 0, kept = 0, through = 0;
-    for (const GripOutcome& f : close_on(object.mesh, 4 * enough, 600, kPoses)) {
+    for (const GripOutcome& f : close_on(object.mesh, 4 * enough, 1000, kPoses)) {
       // It may turn until it lies flat between the plates.
       if (f.way > 0.15 || std::abs(f.speed) > 5e-3) ++lost;
       if (f.gap < 0.008) ++through;
