@@ -521,3 +521,23 @@ def test_a_clone_learns_from_pictures(tmp_path):
                 "--epochs", "2", "--threads", "1", "--see", "eye", "left.rgb_marker")  # fmt: skip
     assert found["keys"] == ["eye", "left.rgb_marker"] and found["rows"] > 0
     assert 0 <= found["test"]["success"] <= 1 and found["script"]["success"] > 0.5
+
+
+def test_a_clone_of_insertion_learns_from_pictures_with_history(tmp_path):
+    pytest.importorskip("h5py", reason="h5py is not installed")
+    found = run("pictures.py", str(tmp_path / "set"), "--task", "insertion", "--demos", "16",
+                "--episodes", "8", "--epochs", "1", "--threads", "1", "--see", "flow",
+                "left.rgb_marker_grip")  # fmt: skip
+    assert found["rows"] > 16 and found["script"]["success"] > 0.5
+    assert 0 <= found["test"]["success"] <= 1
+
+
+def test_a_box_beside_the_hole_is_not_inserted():
+    import picture_tasks
+
+    env = picture_tasks.playing("insertion", ["flow"])(2, threads=1, autoreset="disabled")
+    env.reset(seed=3)
+    for _ in range(8):  # 10 mm each along x, over a wall
+        info = env.step(np.tile([0.5, 0, 0], (2, 1)))[-1]
+    assert (env.batch.q[:, 6] > 0.05).all() and (env.batch.q[:, 8] < -0.01).all()
+    assert not info["success"].any()
