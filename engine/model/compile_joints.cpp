@@ -316,9 +316,9 @@ std::vector<Composite> composites(const CompiledModel& m) {
 
 /// Whether a joint that turns moves a moment of inertia.
 bool turns_inertia(const CompiledModel& m, const kernels::Link& link, const Composite& of) {
-  constexpr double kRounding = 1e-13;  // relative
+  constexpr double kTraceRounding = 1e-13;  // relative
   const Mat3<double>& I = of.inertia;
-  const double least = kRounding * (I.m[0][0] + I.m[1][1] + I.m[2][2]);
+  const double least = kTraceRounding * (I.m[0][0] + I.m[1][1] + I.m[2][2]);
   const auto armature = [&](int k) {
     return m.dof_effects[std::size_t(link.v + k)].armature.value - least;
   };

@@ -18,7 +18,7 @@ namespace tangere {
 namespace {
 
 constexpr double kDegree = 3.14159265358979323846 / 180;
-constexpr float kWhite = 255;
+constexpr float kBrightest = 255;
 constexpr std::uint32_t kSky = 200U | (216U << 8) | (235U << 16);
 constexpr float kSmallest = 1e-20F;  // in place of a direction's number that is zero
 constexpr float kNowhere = 1e30F;    // depth of a ray that meets nothing [m]
@@ -239,7 +239,7 @@ RayRow rows_of(const ViewSolid& solid, const Vector3& light, double ambient, dou
     row.x[k] = single(solid.axes[k][0] / unit_of(solid, k));
     row.size[k] = single(solid.kind == SolidKind::ellipsoid ? 1 / solid.size[k] : solid.size[k]);
     row.light[k] = single(dot(light, solid.axes[k]));
-    row.colour[k] = kWhite * single(std::clamp(solid.colour[k], 0.0, 1.0));
+    row.colour[k] = kBrightest * single(std::clamp(solid.colour[k], 0.0, 1.0));
   }
   return row;
 }

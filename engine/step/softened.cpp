@@ -30,7 +30,7 @@ struct Softening {
 };
 constexpr Softening kSoftenings[] = {{false, 1e-3, 1e-3, 3, 2}, {true, 1e-6, 1e-8, 5, 4}};
 constexpr double kLess = 1e-2;          ///< from one share to begin with to the next
-constexpr double kGrowth = 10;          ///< from one share to the next
+constexpr double kShareGrowth = 10;     ///< from one share to the next
 constexpr double kLeastGrowth = 1.2;    ///< a path that grows more slowly is given up
 constexpr double kNearlyWhole = 0.999;  ///< from here on the share is 1
 constexpr int kMostSearches = 30;       ///< of a path
@@ -39,7 +39,7 @@ constexpr double kLoose = 1e-3;         ///< tolerance on the way
 /// Where a lane is on its path.
 struct SharePath {
   double reached = 0;  ///< share of the last root; 0: none yet
-  double next, growth = kGrowth;
+  double next, growth = kShareGrowth;
   int searches = 0;
 
   /// Chooses the next share. Returns false where the path ends.

@@ -15,12 +15,9 @@
 namespace tangere {
 namespace {
 
-constexpr std::int64_t kBlockEpisodes = 16;
 // For short episodes: creating objects is what costs, and losing a shard should be cheap.
 constexpr std::int64_t kMostEpisodes = 4096;
-std::int64_t blocks_of(std::int64_t episodes) {
-  return (episodes + kBlockEpisodes - 1) / kBlockEpisodes;
-}
+std::int64_t blocks_of(std::int64_t episodes) { return (episodes + kShardBlock - 1) / kShardBlock; }
 
 /// Checks lengths against the limits of the format of a group.
 void check_lengths(const std::vector<std::string>& observations) {
@@ -196,9 +193,9 @@ double DatasetLayout::episode_bytes() const {
 }
 
 std::int64_t DatasetLayout::episodes_per_shard() const {
-  const double blocks = shard_bytes / (episode_bytes() * kBlockEpisodes);
-  constexpr std::int64_t kMostBlocks = kMostEpisodes / kBlockEpisodes;
-  return static_cast<std::int64_t>(std::clamp(blocks, 1.0, double{kMostBlocks})) * kBlockEpisodes;
+  const double blocks = shard_bytes / (episode_bytes() * kShardBlock);
+  constexpr std::int64_t kMostBlocks = kMostEpisodes / kShardBlock;
+  return static_cast<std::int64_t>(std::clamp(blocks, 1.0, double{kMostBlocks})) * kShardBlock;
 }
 
 std::int64_t DatasetLayout::shard_count() const {
@@ -211,7 +208,7 @@ EpisodeRange DatasetLayout::shard_episodes(std::int64_t shard) const {
   const std::int64_t each = shards == 0 ? episodes_per_shard() : 0;
   const auto first = [&](std::int64_t s) {
     if (shards == 0) return std::min(episodes, s * each);
-    return std::min(episodes, s * blocks_of(episodes) / shards * kBlockEpisodes);
+    return std::min(episodes, s * blocks_of(episodes) / shards * kShardBlock);
   };
   return {first(shard), first(shard + 1)};
 }
@@ -219,7 +216,7 @@ EpisodeRange DatasetLayout::shard_episodes(std::int64_t shard) const {
 std::int64_t DatasetLayout::shard_of(std::int64_t episode) const {
   if (shards == 0) return episode / episodes_per_shard();
   // The last shard whose first block, floor(s B / S), is not behind this one.
-  return ((episode / kBlockEpisodes + 1) * shards - 1) / blocks_of(episodes);
+  return ((episode / kShardBlock + 1) * shards - 1) / blocks_of(episodes);
 }
 
 void DatasetLayout::check() const {
@@ -227,7 +224,7 @@ void DatasetLayout::check() const {
   if (shards > blocks_of(episodes))
     throw InputError(
         fmt::format("{} shards of {} episodes; expected at most {}, one for each block of {}",
-                    shards, episodes, blocks_of(episodes), kBlockEpisodes));
+                    shards, episodes, blocks_of(episodes), kShardBlock));
   if (const std::int64_t count = shard_count(); count > kMostShards)
     throw InputError(fmt::format(
         "{} episodes in {} shards; expected at most {} shards: a data set of fewer episodes, or of "

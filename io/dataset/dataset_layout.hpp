@@ -25,6 +25,9 @@ struct Setting {
 /// Largest number of shards; bounds the memory for damaged counts.
 constexpr std::int64_t kMostShards = 1'000'000;
 
+/// Episodes of a shard are a multiple of it, but for the last: lanes of a block of a batch.
+constexpr std::int64_t kShardBlock = 16;
+
 /// Throws InputError unless `name` can name a policy that `who` brings, because it becomes a mask
 /// and a part of the data set's id.
 void check_policy_name(const std::string& who, const std::string& name);

@@ -21,7 +21,7 @@ namespace {
 using h5::Bytes;
 
 constexpr const char* kSamples = "samples";
-constexpr std::int64_t kMostRows = 1 << 26;  // of a demo; a claim becomes that many bytes
+constexpr std::int64_t kMostDemoRows = 1 << 26;  // of a demo; a claim becomes that many bytes
 
 /// "/data/demo_3/obs/pad".
 std::string path_of(std::int64_t demo, std::string_view group, std::string_view name = {}) {
@@ -194,8 +194,8 @@ DemoFacts facts_of(const h5::Id& demo, const DemoMembers& members) {
   };
   DemoFacts facts;
   facts.rows = h5::read_number<std::int64_t>(demo, "num_samples");
-  if (facts.rows < 1 || facts.rows > kMostRows)
-    throw IoError(fmt::format("a demo has {} rows; expected 1 to {}", facts.rows, kMostRows));
+  if (facts.rows < 1 || facts.rows > kMostDemoRows)
+    throw IoError(fmt::format("a demo has {} rows; expected 1 to {}", facts.rows, kMostDemoRows));
   if (members.is_task) {
     const double total = h5::read_number<double>(demo, "return");
     const auto policy = h5::read_number<std::int64_t>(demo, "policy");

@@ -25,7 +25,7 @@ using Json = nlohmann::ordered_json;
 constexpr const char* kMinariVersion = "0.5.3";  // the layout that is written here
 // Of an observation that the view has. Minari needs both bounds of every number, and cannot be told
 // once that they are all equal: metadata.json has 22 bytes for each.
-constexpr std::uint64_t kMostNumbers = std::uint64_t{1} << 18;
+constexpr std::uint64_t kMostObserved = std::uint64_t{1} << 18;
 /// Returns the id that the file gives the data set. It becomes a path, so it must be one that is
 /// written: tangere/NAME-v0 or tangere/TASK/NAME-v0.
 std::string stored_id(const std::string& folder, const h5::Id& scene) {
@@ -72,7 +72,7 @@ bool is_hidden(const DemoArray& array) {
   if (array.type == h5::NumberType::text) return true;
   std::uint64_t numbers = 1;
   for (const std::uint64_t size : array.shape) numbers *= size;
-  return numbers > kMostNumbers;
+  return numbers > kMostObserved;
 }
 
 std::string bound(double value) {

@@ -16,7 +16,6 @@
 namespace tangere {
 namespace {
 
-constexpr std::int64_t kBlockEpisodes = 16;
 constexpr std::size_t kMostHeld = std::size_t{64} << 20;
 constexpr const char* kSpill = ".spill";
 constexpr std::array<unsigned char, 4096> kZeros{};  // behind JPEG files
@@ -34,7 +33,7 @@ ShardFile::ShardFile(const std::string& path, const DatasetLayout& layout, const
       format_(format),
       first_episode_(range.first),
       end_(range.end),
-      unfinished_((range.end - range.first + kBlockEpisodes - 1) / kBlockEpisodes),
+      unfinished_((range.end - range.first + kShardBlock - 1) / kShardBlock),
       next_(range.first),
       sizes_vary_(has_chunks(layout) || layout.has_jpeg()),
       held_bytes_(held_bytes),
@@ -215,7 +214,7 @@ void ShardFile::finish(std::int64_t first_episode, std::span<const FailedEpisode
        next = blocks_.find(next_)) {
     give_place_to_held(next->second);
     blocks_.erase(next);
-    next_ += kBlockEpisodes;
+    next_ += kShardBlock;
   }
 }
 

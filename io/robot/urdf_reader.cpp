@@ -22,7 +22,7 @@ constexpr int kDeepestChain = 150;  // links of a chain; a scene's limit is 200,
 
 const char* const kPictures = "for pictures only";
 const char* const kSoftware = "a setting of other software";
-const char* const kLaw = "coefficients of another contact law";
+const char* const kOtherLaw = "coefficients of another contact law";
 
 const Words kRobotChildren = {
     {"link"},
@@ -40,8 +40,8 @@ const Words kRobotChildren = {
 const Words kLinkChildren = {{"inertial"},
                              {"collision"},
                              {"visual", Fate::idle, kPictures},
-                             {"contact", Fate::idle, kLaw},
-                             {"surface", Fate::idle, kLaw},
+                             {"contact", Fate::idle, kOtherLaw},
+                             {"surface", Fate::idle, kOtherLaw},
                              {"origin", Fate::idle, "a link is where its joint puts it"},
                              {"gravity", Fate::idle, kSoftware},
                              {"kinematic", Fate::idle, kSoftware},
@@ -77,29 +77,30 @@ const Words kExtension = {{"compiler"},
                           {"tendon", Fate::lost, "tendons; scenes have none"},
                           {"deformable", Fate::lost, "bodies that bend; scenes have none"},
                           {"extension", Fate::lost, "plug-ins of MuJoCo"}};
-const Words kCompiler = {{"meshdir"},
-                         {"assetdir"},
-                         {"balanceinertia"},
-                         {"settotalmass"},
-                         {"inertiafromgeom"},
-                         {"boundmass", Fate::zero, "raises masses"},
-                         {"boundinertia", Fate::zero, "raises inertias"},
-                         {"strippath", Fate::idle, "meshes are looked for with and without"},
-                         {"angle", Fate::idle, "angles of URDF are radians"},
-                         {"eulerseq", Fate::idle, "angles of URDF are roll, pitch, yaw"},
-                         {"autolimits", Fate::idle, "joints of URDF say what limits them"},
-                         {"alignfree", Fate::idle, "bodies keep the frames that the file gives"},
-                         {"coordinate", Fate::idle, kSoftware},
-                         {"inertiagrouprange", Fate::idle, "URDF has no groups"},
-                         {"texturedir", Fate::idle, kPictures},
-                         {"discardvisual", Fate::idle, kPictures},
-                         {"fusestatic", Fate::idle, "fixed joints cost nothing here"},
-                         {"convexhull", Fate::idle, "meshes are not replaced by hulls"},
-                         {"exactmeshinertia", Fate::idle, "meshes of URDF have no mass"},
-                         {"fitaabb", Fate::idle, "no primitive is fitted to a mesh"},
-                         {"usethread", Fate::idle, kSolverSetting},
-                         {"saveinertial", Fate::idle, kSolverSetting},
-                         {"conflict", Fate::idle, kSolverSetting}};
+const Words kMujocoCompiler = {
+    {"meshdir"},
+    {"assetdir"},
+    {"balanceinertia"},
+    {"settotalmass"},
+    {"inertiafromgeom"},
+    {"boundmass", Fate::zero, "raises masses"},
+    {"boundinertia", Fate::zero, "raises inertias"},
+    {"strippath", Fate::idle, "meshes are looked for with and without"},
+    {"angle", Fate::idle, "angles of URDF are radians"},
+    {"eulerseq", Fate::idle, "angles of URDF are roll, pitch, yaw"},
+    {"autolimits", Fate::idle, "joints of URDF say what limits them"},
+    {"alignfree", Fate::idle, "bodies keep the frames that the file gives"},
+    {"coordinate", Fate::idle, kSoftware},
+    {"inertiagrouprange", Fate::idle, "URDF has no groups"},
+    {"texturedir", Fate::idle, kPictures},
+    {"discardvisual", Fate::idle, kPictures},
+    {"fusestatic", Fate::idle, "fixed joints cost nothing here"},
+    {"convexhull", Fate::idle, "meshes are not replaced by hulls"},
+    {"exactmeshinertia", Fate::idle, "meshes of URDF have no mass"},
+    {"fitaabb", Fate::idle, "no primitive is fitted to a mesh"},
+    {"usethread", Fate::idle, kSolverSetting},
+    {"saveinertial", Fate::idle, kSolverSetting},
+    {"conflict", Fate::idle, kSolverSetting}};
 
 /// A joint of the file, with the names of its links.
 struct Joint {
@@ -177,7 +178,7 @@ class UrdfReader {
   }
 
   void read_compiler(const RobotNode& node) {
-    node.check(kCompiler);
+    node.check(kMujocoCompiler);
     static_cast<void>(node.parts({{"lengthrange", Fate::idle, kSolverSetting}}));
     mesh_folder_ = node.text("meshdir", node.text("assetdir", "."));
     balances_ = node.flag("balanceinertia", false);
@@ -416,12 +417,13 @@ class UrdfReader {
                 {"group", Fate::idle, kSoftware},
                 {"mask", Fate::idle, kSoftware},
                 {"concave", Fate::idle, kSoftware}});
-    const std::vector<RobotNode> parts = node.parts({{"origin"},
-                                                     {"geometry"},
-                                                     {"verbose", Fate::idle, kSoftware},
-                                                     {"material", Fate::idle, kPictures},
-                                                     {"surface", Fate::idle, kLaw},
-                                                     {"contact_coefficients", Fate::idle, kLaw}});
+    const std::vector<RobotNode> parts =
+        node.parts({{"origin"},
+                    {"geometry"},
+                    {"verbose", Fate::idle, kSoftware},
+                    {"material", Fate::idle, kPictures},
+                    {"surface", Fate::idle, kOtherLaw},
+                    {"contact_coefficients", Fate::idle, kOtherLaw}});
     RobotPiece piece;
     piece.pose = read_origin(last_of(parts, "origin"));
     piece.origin = "<collision>";

@@ -204,8 +204,8 @@ class Starts {
 }  // namespace
 
 void warn_of_starts(const Scene& scene, const SceneNode& root) {
-  constexpr double kRounding = 1e-9;  // of the limits
-  constexpr std::size_t kListed = 8;  // joints in the message
+  constexpr double kLimitRounding = 1e-9;  // of the limits
+  constexpr std::size_t kListed = 8;       // joints in the message
   std::string listed;
   std::size_t count = 0;
   const Source* first = nullptr;
@@ -217,7 +217,7 @@ void warn_of_starts(const Scene& scene, const SceneNode& root) {
     const auto [q, drawn] = starts.at(k);
     if (drawn) continue;
     const auto [low, high] = *joint.limits;
-    const double slack = kRounding * (std::abs(low) + std::abs(high));
+    const double slack = kLimitRounding * (std::abs(low) + std::abs(high));
     if (q >= low - slack && q <= high + slack) continue;
     if (first == nullptr) first = &joint.source;
     if (++count > kListed) continue;

@@ -11,8 +11,8 @@
 namespace tangere {
 namespace {
 
-constexpr double kNoInfluence = 1e-6;  // root mean square change, of the peak, by a whole number
-constexpr double kLeastSlip = 0.03;    // share of the forces that slip, by their squares
+constexpr double kLeastInfluence = 1e-6;  // root mean square change, of the peak, by a whole number
+constexpr double kLeastSlip = 0.03;       // share of the forces that slip, by their squares
 
 bool is_table_number(const std::string& name) { return name.starts_with("pressure["); }
 
@@ -112,7 +112,7 @@ bool ForceFit::holds(std::size_t friction) const {
 std::size_t ForceFit::weakest() const {
   for (std::size_t k = 0; k < names_.size(); ++k) {
     if (is_table_number(names_[k])) continue;
-    if (found_.influence[k] < kNoInfluence) return k;
+    if (found_.influence[k] < kLeastInfluence) return k;
     if (names_[k] == kFriction && holds(k)) return k;
     if (names_[k] == kRelaxation && !(interval(k).low > 0)) return k;
   }

@@ -50,14 +50,14 @@ struct Equations {
 };
 
 /// What is searched besides the lamps.
-struct Shape {
+struct GelShape {
   double depth_ratio, reach, blur;
 };
 
 /// The pixels of a press: their terms and how much they differ from the background.
 class Renderer {
  public:
-  Renderer(const GelBackground& background, double ball, double pixel, const Shape& shape)
+  Renderer(const GelBackground& background, double ball, double pixel, const GelShape& shape)
       : background_(background),
         ball_(ball),
         pixel_(pixel),
@@ -160,7 +160,7 @@ class Fit {
   }
 
  private:
-  [[nodiscard]] Renderer renderer_of(const Shape& shape) const {
+  [[nodiscard]] Renderer renderer_of(const GelShape& shape) const {
     return {background_, ball_, pixel_, shape};
   }
   [[nodiscard]] double difference(std::size_t press, std::size_t number) const {
@@ -191,7 +191,7 @@ class Fit {
   }
 
   /// What the best lamps leave of every third press.
-  [[nodiscard]] double left_by(const Shape& shape) const {
+  [[nodiscard]] double left_by(const GelShape& shape) const {
     Renderer renderer = renderer_of(shape);
     Equations sums;
     for (std::size_t k = 0; k < presses_.size(); k += presses_.size() < 6 ? 1 : 3)
@@ -205,9 +205,9 @@ class Fit {
     for (const double step : steps)
       for (bool better = true; better;) {
         better = false;
-        for (double Shape::*number : {&Shape::depth_ratio, &Shape::reach, &Shape::blur})
+        for (double GelShape::*number : {&GelShape::depth_ratio, &GelShape::reach, &GelShape::blur})
           for (const double factor : {1 + step, 1 / (1 + step)}) {
-            Shape tried = shape_;
+            GelShape tried = shape_;
             tried.*number *= factor;
             tried.depth_ratio = std::min(tried.depth_ratio, deepest_ratio());
             if (const double left = left_by(tried); left < best) {
@@ -320,7 +320,7 @@ class Fit {
   const GelBackground& background_;
   std::span<const BallPress> presses_;
   double ball_, pixel_;
-  Shape shape_{};
+  GelShape shape_{};
   std::vector<Imprint> imprints_;
 };
 

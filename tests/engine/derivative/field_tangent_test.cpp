@@ -27,7 +27,7 @@ std::vector<double> normals(Random& random, std::size_t n, double size = 1) {
   for (double& a : x) a = size * random.normal();
   return x;
 }
-double dot(const std::vector<double>& a, const std::vector<double>& b) {
+double inner_product(const std::vector<double>& a, const std::vector<double>& b) {
   return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);
 }
 
@@ -78,7 +78,7 @@ TEST_P(AlongADirection, MatchesDualNumbersAndTheReverse) {
       forward.field(0, placed.frame.tiles(), change);
       placed.frame.spread(change, dense);
       const std::vector<double> expected = placed.by_duals(lane, {}, d);
-      const double size = std::sqrt(dot(expected, expected));
+      const double size = std::sqrt(inner_product(expected, expected));
       for (std::size_t i = 0; i < dense.size(); ++i)
         ASSERT_NEAR(dense[i], expected[i], 1e-12 * size) << table->name;
       seen += size;
@@ -95,7 +95,8 @@ TEST_P(AlongADirection, MatchesDualNumbersAndTheReverse) {
       for (std::size_t i = 0; i < nv; ++i)
         back += c.q[i * kBlock + std::size_t(lane)] * d.q[i] +
                 c.v[i * kBlock + std::size_t(lane)] * d.v[i];
-      EXPECT_NEAR(dot(weights, dense), back, 1e-12 * size * std::sqrt(dot(weights, weights)))
+      EXPECT_NEAR(inner_product(weights, dense), back,
+                  1e-12 * size * std::sqrt(inner_product(weights, weights)))
           << table->name;
     }
   }
@@ -151,11 +152,12 @@ TEST_P(AlongADirection, PointsHaveDerivativesByNumbersOfTheirOwn) {
       for (std::size_t i = 0; i < points; ++i)
         d[i * kPointNumbers + number] = direction[i], g[i] = gradient[i * kPointNumbers + number];
       const std::vector<double> change = placed.by_duals(lane, d, {zero, zero, {}, {}});
-      const double back = dot(gradient, d),
-                   size = std::sqrt(dot(weights, weights) * dot(change, change));
-      EXPECT_NEAR(back, dot(weights, change), 1e-12 * size) << "number " << number;
+      const double back = inner_product(gradient, d),
+                   size =
+                       std::sqrt(inner_product(weights, weights) * inner_product(change, change));
+      EXPECT_NEAR(back, inner_product(weights, change), 1e-12 * size) << "number " << number;
       const auto value = [&](double e) {
-        return dot(weights, field_of(moved_points(scene, number, direction, e), s));
+        return inner_product(weights, field_of(moved_points(scene, number, direction, e), s));
       };
       const double e = number < 3 ? 1e-8 : 1e-6, right = (value(e) - value(0)) / e,
                    left = (value(0) - value(-e)) / e;
@@ -177,7 +179,7 @@ TEST_P(AlongADirection, AnArrayPointByPointHasTheSameField) {
                             b = field_of(
                                 moved_points(scene, 0, std::vector<double>(a.size() / 3), 0), s);
   ASSERT_EQ(a.size(), b.size());
-  const double size = std::sqrt(dot(a, a));
+  const double size = std::sqrt(inner_product(a, a));
   EXPECT_GT(size, 0);
   for (std::size_t i = 0; i < a.size(); ++i) EXPECT_NEAR(a[i], b[i], 1e-12 * size);
 }

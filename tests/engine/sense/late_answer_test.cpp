@@ -46,7 +46,7 @@ std::vector<double> reading(Readout& readout, const Batch& batch, int environmen
 ///   ∮ y dx = π X² a ωτ/(1 + (ωτ)²),
 /// which vanishes for slow and for fast swings.
 TEST(LateAnswer, EnclosesTheLoopOfAMaxwellElement) {
-  constexpr double kShare = 0.3, kStep = 1e-3, kPeriod = 0.5, kMiddle = 2e-3, kSwing = 1e-3;
+  constexpr double kShare = 0.3, kStep = 1e-3, kPeriod = 0.5, kRestHeight = 2e-3, kSwing = 1e-3;
   constexpr double kOmega = 2 * std::numbers::pi / kPeriod;
   const std::vector<double> lags = {0.01, 0.08, 0.3};
   Scene s;
@@ -56,7 +56,7 @@ TEST(LateAnswer, EnclosesTheLoopOfAMaxwellElement) {
   s.solver.tolerance = 1e-12;
   s.links = {testing::link("pad", JointType::prismatic, {0, 0, 0},
                            CuboidShape{{0.02, 0.02, 0.02}, {2, 2, 2}}, 1000),
-             testing::link("block", JointType::fixed, {0, 0, -0.06 + kMiddle},
+             testing::link("block", JointType::fixed, {0, 0, -0.06 + kRestHeight},
                            CuboidShape{{0.1, 0.1, 0.1}, {2, 2, 2}}, 1000)};
   s.links[0].joint.axis0 = {0, 0, 1};
   s.links[0].joint.stiffness = kOmega * kOmega * 8e-6 * 1000;

@@ -18,7 +18,7 @@ namespace {
 
 using ::testing::HasSubstr;
 using Numbers = std::vector<double>;
-constexpr int kRowsOfPad = 14, kColsOfPad = 12, kHigh = 28, kWide = 24;
+constexpr int kRowsOfPad = 14, kColsOfPad = 12, kPictureRows = 28, kPictureCols = 24;
 constexpr double kPressDepth = 0.8e-3;  // [m]
 
 /// A ball that presses a gel off its middle, at 1.5 mm along axis0 and -1 mm along axis1.
@@ -43,7 +43,7 @@ Scene pictured_gel() {
   t.coefficients = {40, 20, 0.8, 0, 16};
   t.markers.emplace();
   t.picture.emplace();
-  t.picture->rows = kHigh, t.picture->cols = kWide;
+  t.picture->rows = kPictureRows, t.picture->cols = kPictureCols;
   t.picture->gel = std::make_shared<const Gel>(default_gel());
   t.picture->source = {"gel.xml", 11};
   t.picture->markers = {3, 4};
@@ -80,14 +80,14 @@ TEST(PictureReading, IsTheBackgroundWithoutTouch) {
   const auto bytes = picture<std::uint8_t>(scene, FieldForm::rgb, -1e-3);
   for (const std::uint8_t level : bytes) ASSERT_EQ(level, 100);
   EXPECT_EQ(picture<float>(scene, FieldForm::height, -1e-3),
-            std::vector<float>(kHigh * kWide, 0.0F));
+            std::vector<float>(kPictureRows * kPictureCols, 0.0F));
 }
 
 /// The place of the largest number, in points.
 std::array<double, 2> highest(const Numbers& heights) {
   const auto at = std::max_element(heights.begin(), heights.end()) - heights.begin();
-  return {(double(at / kWide) + 0.5) * kRowsOfPad / kHigh - 0.5,
-          (double(at % kWide) + 0.5) * kColsOfPad / kWide - 0.5};
+  return {(double(at / kPictureCols) + 0.5) * kRowsOfPad / kPictureRows - 0.5,
+          (double(at % kPictureCols) + 0.5) * kColsOfPad / kPictureCols - 0.5};
 }
 
 TEST(PictureReading, ShowsTheBallWhereItPressesAndAsDeep) {
@@ -167,7 +167,7 @@ std::array<double, 2> dark_centre(const std::vector<std::uint8_t>& dark,
   double sum = 0, down = 0, across = 0;
   for (int i = row; i < row + 7; ++i)
     for (int j = col; j < col + 8; ++j) {
-      const auto k = std::size_t(3 * (i * kWide + j));
+      const auto k = std::size_t(3 * (i * kPictureCols + j));
       const double d = bright[k] - dark[k];
       sum += d, down += d * (i + 0.5), across += d * (j + 0.5);
     }

@@ -16,13 +16,13 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
-constexpr int kRows = 40, kCols = 52;
+constexpr int kPictureRows = 40, kPictureCols = 52;
 
 /// Smooth in place, other in each channel.
 std::vector<std::uint8_t> levels() {
   std::vector<std::uint8_t> all;
-  for (int i = 0; i < kRows; ++i)
-    for (int j = 0; j < kCols; ++j)
+  for (int i = 0; i < kPictureRows; ++i)
+    for (int j = 0; j < kPictureCols; ++j)
       for (int c = 0; c < 3; ++c)
         all.push_back(static_cast<std::uint8_t>(
             std::lround(128 + 100 * std::sin(0.07 * i + 0.05 * (c + 1) * j))));
@@ -43,9 +43,9 @@ TEST(JpegFile, IsReadAsItWasWrittenButForItsLoss) {
   double last = 1e9;
   std::size_t size = 0;
   for (const int quality : {30, 75, 95}) {
-    const std::string file = jpeg_bytes(kRows, kCols, given, quality);
+    const std::string file = jpeg_bytes(kPictureRows, kPictureCols, given, quality);
     const Photograph found = parse_jpeg(file, "a.jpg");
-    ASSERT_EQ(found.rows * 100 + found.cols, 100 * kRows + kCols);
+    ASSERT_EQ(found.rows * 100 + found.cols, 100 * kPictureRows + kPictureCols);
     double square = 0;
     for (std::size_t k = 0; k < given.size(); ++k)
       square += std::pow(double(found.levels[k]) - given[k], 2) / double(given.size());
@@ -57,11 +57,12 @@ TEST(JpegFile, IsReadAsItWasWrittenButForItsLoss) {
 }
 
 TEST(JpegFile, HasTheSameBytesForTheSamePicture) {
-  EXPECT_EQ(jpeg_bytes(kRows, kCols, levels(), 90), jpeg_bytes(kRows, kCols, levels(), 90));
+  EXPECT_EQ(jpeg_bytes(kPictureRows, kPictureCols, levels(), 90),
+            jpeg_bytes(kPictureRows, kPictureCols, levels(), 90));
 }
 
 TEST(JpegFile, IsRefusedWhereItIsNone) {
-  const std::string file = jpeg_bytes(kRows, kCols, levels(), 90);
+  const std::string file = jpeg_bytes(kPictureRows, kPictureCols, levels(), 90);
   EXPECT_THAT(jpeg_refusal(""), AllOf(StartsWith("a.jpg: "), HasSubstr("a picture as JPEG")));
   EXPECT_THAT(jpeg_refusal("no picture"), HasSubstr("Not a JPEG file"));
   EXPECT_THAT(jpeg_refusal(file.substr(0, file.size() / 2)), StartsWith("a.jpg: "));

@@ -18,12 +18,12 @@ std::string with_camera(const std::string& attributes) {
   text.insert(text.find("</sensor>"), "<camera " + attributes + "/>\n");
   return text;
 }
-Scene scene_of(const std::string& attributes) {
+Scene camera_scene(const std::string& attributes) {
   return parse_scene(with_camera(attributes), "eye.xml").scene;
 }
 std::string message(const std::string& attributes) {
   try {
-    static_cast<void>(scene_of(attributes));
+    static_cast<void>(camera_scene(attributes));
   } catch (const InputError& error) {
     return error.what();
   }
@@ -38,14 +38,14 @@ std::string line() {
 }
 
 TEST(CameraFile, HasItsDefaultsAndItsNumbers) {
-  const Scene plain = scene_of(kPlace);
+  const Scene plain = camera_scene(kPlace);
   ASSERT_EQ(plain.cameras.size(), 1U);
   EXPECT_EQ(plain.cameras[0].rows, 128);
   EXPECT_EQ(plain.cameras[0].far, 10);
   EXPECT_EQ(plain.cameras[0].body, "");
   EXPECT_THAT(plain.cameras[0].up, ElementsAre(0, 0, 1));
   const CameraDescription all =
-      scene_of(
+      camera_scene(
           "name=\"wrist\" body=\"pad\" pos=\"0 0 0.1\" look=\"0 0 0\" up=\"0 1 0\" fov=\"60\" "
           "rows=\"24\" cols=\"32\" far=\"2\" light=\"0 0 1\" ambient=\"0.5\" noise=\"1\" "
           "gain=\"0.1\"")

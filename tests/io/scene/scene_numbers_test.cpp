@@ -90,7 +90,7 @@ struct Row {
   bool has_gradient;
   double value;  ///< in the scene; NAN: the scene does not give the start
 };
-const Row kRows[] = {
+const Row kNumberRows[] = {
     {R"(general_primitive_contact general_body="skin" primitive_body="ball" field="kn")",
      "contact skin ball kn", "N/m", true, 5},
     {R"(general_primitive_contact general_body="skin" primitive_body="ball" field="kt")",
@@ -152,7 +152,7 @@ const NumberInfo* find(const NumberGradients& gradients, const std::string& name
 
 /// Every row that <randomize> takes: from its element to the same address everywhere.
 TEST(SceneNumbers, HaveOneNameAndUnitFromTheSceneToTheFile) {
-  for (const Row& row : kRows) {
+  for (const Row& row : kNumberRows) {
     if (*row.xml == '\0') continue;
     SCOPED_TRACE(row.xml);
     const Scene scene = read("<" + std::string(row.xml) + " uniform=\"0.125 0.25\"/>");
@@ -204,7 +204,7 @@ TEST(SceneNumbers, NoKindIsForgotten) {
   const Scene scene = read("");
   const Model model(scene);
   const NumberGradients gradients(model);
-  for (const Row& row : kRows) {
+  for (const Row& row : kNumberRows) {
     const NumberInfo* const info = find(gradients, row.name);
     // Without ks there is no memory to take a derivative of; <randomize> above gives it one.
     const bool idle = std::string(row.name).ends_with(" ks");
@@ -230,7 +230,8 @@ TEST(SceneNumbers, NoKindIsForgotten) {
                (indexed || at + end.size() == name.size()) &&
                row.has_gradient == kind.has(kGradient);
       };
-      EXPECT_TRUE(std::any_of(std::begin(kRows), std::end(kRows), is_of)) << of << kind.name;
+      EXPECT_TRUE(std::any_of(std::begin(kNumberRows), std::end(kNumberRows), is_of))
+          << of << kind.name;
     }
   }
 }
@@ -264,7 +265,7 @@ damping="2"/></sensor>
 TEST(SceneNumbers, NoTwoHaveOneName) {
   std::string lines;
   std::size_t count = 0;
-  for (const Row& row : kRows)
+  for (const Row& row : kNumberRows)
     if (*row.xml != '\0') lines += "<" + std::string(row.xml) + " uniform=\"0.1 0.2\"/>\n", ++count;
   const Scene scene = read(lines);
   ASSERT_THAT(scene.randomizations, SizeIs(count));

@@ -46,7 +46,7 @@ class TacFile {
   std::filesystem::path path_;
 };
 
-std::string complaint(const std::string& text) {
+std::string points_error(const std::string& text) {
   const TacFile file(text);
   try {
     read_tactile_points(file.path());
@@ -171,20 +171,20 @@ TEST(TactileLayouts, AFileGivesPlacesAxesAndFactors) {
 
 TEST(TactileLayouts, FilesSayWhatIsWrongAndWhere) {
   const std::string good = "\"0 0 0\" \"0 0\" \"0 0 1\" \"1 0 0\" \"0 1 0\"\n";
-  EXPECT_THAT(complaint(""), HasSubstr("empty"));
-  EXPECT_THAT(complaint("many\n"), HasSubstr(":1: 'many'; expected a count of points"));
-  EXPECT_THAT(complaint("0\n"), HasSubstr(":1: the first line is no count"));
-  EXPECT_THAT(complaint("2\n" + good), HasSubstr("ends after 1 of 2"));
-  EXPECT_THAT(complaint("1\n" + good + good), HasSubstr(":3: more than the 1 points"));
-  EXPECT_THAT(complaint("1\n\"0 0 0\" \"0 0\" \"0 0 1\" \"1 0 0\"\n"),
+  EXPECT_THAT(points_error(""), HasSubstr("empty"));
+  EXPECT_THAT(points_error("many\n"), HasSubstr(":1: 'many'; expected a count of points"));
+  EXPECT_THAT(points_error("0\n"), HasSubstr(":1: the first line is no count"));
+  EXPECT_THAT(points_error("2\n" + good), HasSubstr("ends after 1 of 2"));
+  EXPECT_THAT(points_error("1\n" + good + good), HasSubstr(":3: more than the 1 points"));
+  EXPECT_THAT(points_error("1\n\"0 0 0\" \"0 0\" \"0 0 1\" \"1 0 0\"\n"),
               HasSubstr(":2: 11 numbers; expected"));
-  EXPECT_THAT(complaint("1\n\"0 0 nan\" \"0 0\" \"0 0 1\" \"1 0 0\" \"0 1 0\"\n"),
+  EXPECT_THAT(points_error("1\n\"0 0 nan\" \"0 0\" \"0 0 1\" \"1 0 0\" \"0 1 0\"\n"),
               HasSubstr(":2: 'nan'; expected a number of at most"));
-  EXPECT_THAT(complaint("1\n\"0 0 0\" \"0 0.5\" \"0 0 1\" \"1 0 0\" \"0 1 0\"\n"),
+  EXPECT_THAT(points_error("1\n\"0 0 0\" \"0 0.5\" \"0 0 1\" \"1 0 0\" \"0 1 0\"\n"),
               HasSubstr("'0.5'; expected a whole number"));
-  EXPECT_THAT(complaint("1\n\"0 0 0\" \"0 0\" \"0 0 0\" \"1 0 0\" \"0 1 0\"\n"),
+  EXPECT_THAT(points_error("1\n\"0 0 0\" \"0 0\" \"0 0 0\" \"1 0 0\" \"0 1 0\"\n"),
               HasSubstr("normal has no length"));
-  EXPECT_THAT(complaint("1\n\"0 0 0\" \"0 0\" \"0 0 1\" \"1 0 0\" \"0 1 0\" \"1 1 1 -1\"\n"),
+  EXPECT_THAT(points_error("1\n\"0 0 0\" \"0 0\" \"0 0 1\" \"1 0 0\" \"0 1 0\" \"1 1 1 -1\"\n"),
               HasSubstr("factor -1"));
   EXPECT_THROW(read_tactile_points("/nowhere/points.txt"), IoError);
 }

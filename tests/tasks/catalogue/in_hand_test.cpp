@@ -23,7 +23,7 @@ using testing::starts;
 using testing::task_named;
 using testing::uniform_distance;
 
-constexpr double kDegree = std::numbers::pi / 180;
+constexpr double kOneDegree = std::numbers::pi / 180;
 constexpr std::size_t kObject =
     13;  // first coordinate of the object, behind those of fingers and stand
 
@@ -35,9 +35,9 @@ TEST(InHand, StartsAndGoalsFollowTheirDistributions) {
   const auto yaw = [](const Start& s) {
     return 2 * std::atan2(s.q[kObject + 6], s.q[kObject + 3]);
   };
-  EXPECT_LT(uniform_distance(column(all, yaw), -45 * kDegree, 45 * kDegree), kUnlikely);
+  EXPECT_LT(uniform_distance(column(all, yaw), -45 * kOneDegree, 45 * kOneDegree), kUnlikely);
   const auto goal = [](const Start& s) { return s.memory.at(0); };
-  EXPECT_LT(uniform_distance(column(all, goal), -60 * kDegree, 60 * kDegree), kUnlikely);
+  EXPECT_LT(uniform_distance(column(all, goal), -60 * kOneDegree, 60 * kOneDegree), kUnlikely);
   EXPECT_LT(
       uniform_distance(column(all, [](const Start& s) { return s.varying.at(0); }), 0.0522, 0.0638),
       kUnlikely);
@@ -46,13 +46,13 @@ TEST(InHand, StartsAndGoalsFollowTheirDistributions) {
 TEST(InHand, PaysForTheAngleToTheGoal) {
   const auto task = task_named("in_hand");
   OwnView own(*task);
-  const double half = 100 * kDegree / 2;
+  const double half = 100 * kOneDegree / 2;
   own.q[0][kObject + 3] = std::cos(half), own.q[0][kObject + 6] = std::sin(half);
-  own.memory[0] = -50 * kDegree;  // an axis has no sense: 30° away
+  own.memory[0] = -50 * kOneDegree;  // an axis has no sense: 30° away
   StepOutcome verdict = task->evaluate(own.view());
   EXPECT_NEAR(verdict.reward, -1, 1e-12);
   EXPECT_FALSE(verdict.terminated || verdict.success);
-  own.memory[0] = -71 * kDegree;
+  own.memory[0] = -71 * kOneDegree;
   TaskView last = own.view();
   last.actions = task->spec().horizon;
   verdict = task->evaluate(last);
