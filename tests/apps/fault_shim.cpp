@@ -2,13 +2,13 @@
 // Preloaded into a program (LD_PRELOAD), it makes one call of the operating system fail, or lie.
 //
 // TANGERE_FAULT=kind:n fails the n-th call of a kind, counted from 1, with EIO (writes: ENOSPC,
-// threads: EAGAIN, and all later ones too, memory: ENOMEM). TANGERE_FAULT_COUNT=file writes there,
-// when the program ends, how many calls of that kind there were. Kinds: write, sync, rename, close,
-// truncate, open, read, thread, memory. Allocations by HDF5 and zlib are not among memory: HDF5
-// uses about one in thirty without a check, and stores a chunk as it is where zlib gets no memory
-// (docs/failures.md). Two more kinds are those of a disk that lies: the n-th write or truncation
-// (lost) does nothing, or the n-th write puts zeros in place of the bytes (zeros), and says that it
-// succeeded.
+// threads: EAGAIN, and all later ones too, memory: ENOMEM). TANGERE_FAULT=count:0 fails none, and
+// TANGERE_FAULT_COUNT=file writes there, when the program ends, how many calls of each kind there
+// were. Kinds: write, sync, rename, close, truncate, open, read, thread, memory. Allocations by
+// HDF5 and zlib are not among memory: HDF5 uses about one in thirty without a check, and stores a
+// chunk as it is where zlib gets no memory (docs/failures.md). Two more kinds are those of
+// a disk that lies: the n-th write or truncation (lost) does nothing, or the n-th write puts zeros
+// in place of the bytes (zeros), and says that it succeeded.
 #include <dlfcn.h>
 #include <fcntl.h>
 #include <link.h>
@@ -40,10 +40,17 @@ namespace {
 
 // Nothing here may allocate: memory is one of the kinds. The environment is read when the library
 // is loaded; calls before that succeed.
+constexpr const char* kKinds[] = {"write", "sync",   "rename", "close", "truncate", "open",
+                                  "read",  "thread", "memory", "lost",  "zeros"};
 char kind[16];
-long failing = -1;  // -1: not loaded yet
-std::atomic<long> unshared{0};
-std::atomic<long>* calls = &unshared;  // of the program and of its child processes together
+bool counting = false;  // all kinds
+long failing = -1;      // -1: not loaded yet
+/// Calls by kind; of the one that fails where none are counted.
+struct Calls {
+  std::atomic<long> by_kind[std::size(kKinds)], failing;
+};
+Calls unshared{};
+Calls* calls = &unshared;  // of the program and of its child processes together
 
 /// Code of a library whose allocations do not fail, [begin, end).
 struct Exempt {
@@ -74,7 +81,11 @@ int find_exempt(dl_phdr_info* library, std::size_t, void*) {
 
 /// Whether this call is the one that fails.
 bool fails(const char* of) {
-  return failing >= 0 && std::strcmp(of, kind) == 0 && ++*calls == failing;
+  if (failing < 0) return false;
+  if (!counting) return std::strcmp(of, kind) == 0 && ++calls->failing == failing;
+  for (std::size_t k = 0; k < std::size(kKinds); ++k)
+    if (std::strcmp(of, kKinds[k]) == 0) ++calls->by_kind[k];
+  return false;
 }
 
 template <class F>
@@ -94,17 +105,18 @@ __attribute__((constructor)) void load() {
   void* const page =
       mmap(nullptr, sizeof *calls, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
   dl_iterate_phdr(find_exempt, nullptr);
-  if (page != MAP_FAILED) calls = new (page) std::atomic<long>(0);
+  if (page != MAP_FAILED) calls = new (page) Calls{};
+  counting = std::strcmp(kind, "count") == 0;
   failing = std::atol(colon + 1);
 }
 
 __attribute__((destructor)) void report() {
   const char* const path = std::getenv("TANGERE_FAULT_COUNT");
   if (path == nullptr) return;
-  const long counted = *calls;
   failing = -1;
   if (std::FILE* const file = std::fopen(path, "w")) {
-    std::fprintf(file, "%ld\n", counted);
+    for (std::size_t k = 0; k < std::size(kKinds); ++k)
+      std::fprintf(file, "%s %ld\n", kKinds[k], calls->by_kind[k].load());
     std::fclose(file);
   }
 }
@@ -225,7 +237,8 @@ extern "C" int pthread_create(pthread_t* thread, const pthread_attr_t* how, void
   static auto* const call =
       real<int(pthread_t*, const pthread_attr_t*, void* (*)(void*), void*)>("pthread_create");
   // A limit on threads stays met: all later ones fail as well.
-  return fails("thread") || (std::strcmp(kind, "thread") == 0 && failing > 0 && *calls > failing)
+  return fails("thread") ||
+                 (std::strcmp(kind, "thread") == 0 && failing > 0 && calls->failing > failing)
              ? EAGAIN
              : call(thread, how, run, with);
 }

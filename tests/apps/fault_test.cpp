@@ -10,6 +10,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <map>
+#include <sstream>
 
 #include "tests/apps/program.hpp"
 #include "tests/files.hpp"
@@ -88,50 +89,69 @@ long tries_of(const std::string& kind, long calls) {
   return std::string(given) == "all" ? calls : std::stol(given);
 }
 
+/// What the other runs of a job are compared with. Made once for all kinds of calls.
+struct Undisturbed {
+  Folder before;                                ///< copied for every call that fails
+  std::map<std::string, std::string> given;     ///< final files before the job
+  std::map<std::string, std::string> expected;  ///< and after it
+  std::map<std::string, long> calls;            ///< by kind
+};
+
+Outcome run_shimmed(const Folder& folder, const Words& words, const std::string& fault,
+                    const std::string& count = "") {
+  std::vector<std::string> environment = {"LD_PRELOAD=" TANGERE_FAULT_SHIM,
+                                          "TANGERE_FAULT=" + fault};
+  if (!count.empty()) environment.push_back("TANGERE_FAULT_COUNT=" + count);
+  return run(folder, words, environment);
+}
+
+void copy_folder(const Folder& from, const Folder& to) {
+  fs::copy(from.path(), to.path(), fs::copy_options::recursive | fs::copy_options::copy_symlinks);
+}
+
+void prepare_job(const Job& job, const Words& words, Undisturbed& u) {
+  fs::copy_file(scene("rolling_ball_small.xml"), u.before.path("scene.xml"));
+  std::string table;  // of many buffers
+  for (int row = 0; row < 5000; ++row) table += "0.01,0,0.19999\n";
+  u.before.write("u.csv", table);
+  for (const Words& before : job.before) ASSERT_EQ(run(u.before, before).exit_code, 0);
+  const Folder folder, counts;
+  copy_folder(u.before, folder);
+  u.given = final_files(folder.path());
+  const Outcome whole = run_shimmed(folder, words, "count:0", counts.path("calls"));
+  ASSERT_EQ(whole.exit_code, 0) << whole.err;
+  u.expected = final_files(folder.path());
+  ASSERT_NE(u.expected, u.given);
+  std::istringstream lines(file_bytes(counts.path("calls")));
+  std::string kind;
+  for (long number = 0; lines >> kind >> number;) u.calls[kind] = number;
+}
+
 class Fault : public ::testing::TestWithParam<std::tuple<Job, const char*>> {
  protected:
-  /// What is there before the job: made once, copied for every call that fails.
   void SetUp() override {
-    fs::copy_file(scene("rolling_ball_small.xml"), before_.path("scene.xml"));
-    std::string table;  // of many buffers
-    for (int row = 0; row < 5000; ++row) table += "0.01,0,0.19999\n";
-    before_.write("u.csv", table);
-    for (const Words& words : std::get<0>(GetParam()).before)
-      ASSERT_EQ(run(before_, words).exit_code, 0);
-  }
-  void prepare(const Folder& folder) const {
-    fs::copy(before_.path(), folder.path(),
-             fs::copy_options::recursive | fs::copy_options::copy_symlinks);
-  }
-  /// The n-th call fails; 0: none.
-  Outcome run_with(const Folder& folder, long n, const std::string& count = "") {
-    std::vector<std::string> environment = {
-        "LD_PRELOAD=" TANGERE_FAULT_SHIM,
-        std::string("TANGERE_FAULT=") + std::get<1>(GetParam()) + ":" + std::to_string(n)};
-    if (!count.empty()) environment.push_back("TANGERE_FAULT_COUNT=" + count);
-    Words words = std::get<0>(GetParam()).words;
+    const Job& job = std::get<0>(GetParam());
+    const bool memory = std::string(std::get<1>(GetParam())) == "memory";
+    words_ = job.words;
     // The n-th allocation is the same one in every run only if threads do not take turns.
-    if (std::string(std::get<1>(GetParam())) == "memory")
-      if (const auto threads = std::find(words.begin(), words.end(), "--threads");
-          threads != words.end())
+    if (memory)
+      if (const auto threads = std::find(words_.begin(), words_.end(), "--threads");
+          threads != words_.end())
         *(threads + 1) = "1";
-    return run(folder, words, environment);
+    static std::map<std::pair<std::string, bool>, Undisturbed> all;
+    const auto [place, added] = all.try_emplace({job.name, memory});
+    if (added) prepare_job(job, words_, place->second);
+    whole_ = &place->second;
   }
-
- private:
-  const Folder before_;
+  Words words_;
+  const Undisturbed* whole_ = nullptr;
 };
 
 TEST_P(Fault, LeavesWholeFilesOrNone) {
   const std::string kind = std::get<1>(GetParam());
-  const Folder undisturbed, counts;
-  prepare(undisturbed);
-  const auto given = final_files(undisturbed.path());
-  const Outcome whole = run_with(undisturbed, 0, counts.path("calls"));
-  ASSERT_EQ(whole.exit_code, 0) << whole.err;
-  const auto expected = final_files(undisturbed.path());
-  ASSERT_NE(expected, given);
-  const long calls = std::stol(file_bytes(counts.path("calls")));
+  const auto& [before, given, expected, all_calls] = *whole_;
+  ASSERT_TRUE(all_calls.contains(kind));
+  const long calls = all_calls.at(kind);
   const long step = std::max(1L, calls / std::max(1L, tries_of(kind, calls)));
   int failed = 0, tried = 0;
   // oneTBB crashes where it is refused a thread, so the program asks for threads beforehand: a
@@ -140,8 +160,8 @@ TEST_P(Fault, LeavesWholeFilesOrNone) {
   for (long n = 1; n <= last; n += step, ++tried) {
     SCOPED_TRACE(std::to_string(n) + " of " + std::to_string(calls) + " calls");
     const Folder folder;
-    prepare(folder);
-    const Outcome outcome = run_with(folder, n);
+    copy_folder(before, folder);
+    const Outcome outcome = run_shimmed(folder, words_, kind + ":" + std::to_string(n));
     ASSERT_EQ(outcome.signal, 0) << outcome.err;
     // HDF5 1.10 crashes over some reads that fail while it copies; the command survives that.
     if (kind != "read") {
