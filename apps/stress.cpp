@@ -90,7 +90,8 @@ Command add_stress(CLI::App& program) {
                       "Cut steps into parts that keep this relative accuracy, with schemes that "
                       "estimate their error [default: steps are not cut]");
   add_flag(app, "--quick", o.quick,
-           "Short cases alone, each with its first step: seconds in place of minutes");
+           "Short cases alone, each with its first step and at most two environments: "
+           "seconds in place of minutes");
   add_threads_option(app, o.threads,
                      "Threads. Cases of one environment use one. [default: the processors here]");
   add_console_options(app, *console);

@@ -22,7 +22,8 @@
 namespace tangere {
 namespace {
 
-constexpr double kMostHistory = 2e9;  // bytes of what a block's environments did
+constexpr int kQuickEnvironments = 2;  // at most, of a quick run
+constexpr double kMostHistory = 2e9;   // bytes of what a block's environments did
 constexpr double kNotANumber = std::numeric_limits<double>::quiet_NaN();
 
 struct Setting {
@@ -103,19 +104,19 @@ struct Play {
 };
 
 /// Plays a scene and adds up its blocks. None when it was stopped.
-std::optional<BlockOutcome> play(const Scene& scene, const StressCase& of, const Setting& setting,
-                                 int threads, const std::stop_token& stop) {
+std::optional<BlockOutcome> play(const Scene& scene, const StressCase& of, int environments,
+                                 const Setting& setting, int threads, const std::stop_token& stop) {
   const Model model(scene);
   const ControlProgram controls(model, setting.step, 0);
   const std::int64_t steps =
       of.seconds > 0 ? std::llround(of.seconds / setting.step) : controls.steps();
   const double bytes = static_cast<double>(steps) * model.nb() * 13 * sizeof(double) *
-                       std::min(of.environments, kernels::kBlock);
+                       std::min(environments, kernels::kBlock);
   if (of.measure && bytes > kMostHistory)
     throw InputError("case '" + of.name + "' takes " + std::to_string(steps) +
                      " steps, whose history does not fit; expected a longer timestep");
   Play run{of.measure, of.bound,
-           setting,    Batch(model, of.environments),
+           setting,    Batch(model, environments),
            controls,   std::max<std::int64_t>(steps, 1),
            stop};
   const int used = std::min(threads, run.batch.blocks());
@@ -126,7 +127,7 @@ std::optional<BlockOutcome> play(const Scene& scene, const StressCase& of, const
     workers.push_back(
         {Stepper(model, {setting.integrator, setting.step, std::nullopt, setting.accuracy}),
          Readout(model)});
-  std::vector<double> u(as_size(of.environments) * as_size(model.nu()));
+  std::vector<double> u(as_size(environments) * as_size(model.nu()));
   std::vector<BlockOutcome> blocks(as_size(run.batch.blocks()));
   block_threads.for_each(run.batch.blocks(), workers,
                          [&](Worker& w, int b) { run.block(w, b, u, blocks[as_size(b)]); });
@@ -189,11 +190,12 @@ std::string warning_of(const Scene& scene, const StressRow& row) {
 /// Fills in the result of a setting. False if it was stopped.
 bool measure(const Scene& scene, int threads, const std::stop_token& stop, StressRow& row) {
   const Setting setting{row.integrator, row.step, row.accuracy};
-  const auto out = play(varied(scene, row.of->variant), *row.of, setting, threads, stop);
+  const auto out =
+      play(varied(scene, row.of->variant), *row.of, row.environments, setting, threads, stop);
   if (!out) return false;
   row.value = out->worst;
   if (!row.of->measure) {
-    const auto ordinary = play(scene, *row.of, setting, threads, stop);
+    const auto ordinary = play(scene, *row.of, row.environments, setting, threads, stop);
     if (!ordinary) return false;
     row.value = passes(*out) / passes(*ordinary);
   }
@@ -263,7 +265,8 @@ bool run_case(const StressCase& of, const StressOptions& options, const StressSc
     row.integrator = setting.integrator;
     row.step = setting.step;
     row.accuracy = setting.accuracy;
-    row.environments = of.environments;
+    row.environments =
+        options.quick ? std::min(of.environments, kQuickEnvironments) : of.environments;
     if (!measure(scene, options.threads, listener.stop, row)) return false;
     if (row.verdict == StressVerdict::fails && !warnings.empty()) {
       row.verdict = StressVerdict::flagged;

@@ -43,7 +43,8 @@ struct StressOptions {
   std::optional<double> step;            ///< instead of the case's steps [s]
   /// Cuts steps into parts that keep it. Schemes without an estimate are then left out.
   std::optional<double> accuracy;
-  bool quick = false;  ///< quick cases alone, each at its first step
+  bool quick = false;  ///< quick cases alone, each at its first step and with at most
+                       ///< two environments
   int threads = 1;
 };
 
