@@ -105,7 +105,7 @@ TEST(Accuracy, TakesATask) {
 TEST(Accuracy, SaysWhyNothingIsResolved) {
   const Folder folder;
   const json answer =
-      run_json(folder, {"accuracy", scene("stable_grasp.xml"), "--steps", "60", "--envs", "2"}, 1);
+      run_json(folder, {"accuracy", scene("stable_grasp.xml"), "--steps", "40", "--envs", "1"}, 1);
   EXPECT_EQ(answer.at("advice").at("resolved"), false);
   EXPECT_THAT(answer.at("advice").at("text").get<std::string>(),
               AllOf(HasSubstr("Not resolved"), HasSubstr(" Hz")));
