@@ -13,6 +13,7 @@
 #include <fstream>
 #include <functional>
 #include <limits>
+#include <memory>
 
 #include "tests/apps/program.hpp"
 #include "tests/files.hpp"
@@ -135,8 +136,6 @@ struct Damage {
 };
 void PrintTo(const Damage& damage, std::ostream* out) { *out << damage.name; }
 
-class DamagedShard : public ::testing::TestWithParam<Damage> {};
-
 Words generate() {
   return {"generate",   scene("rolling_ball_small.xml"),
           "--episodes", "3",
@@ -157,9 +156,21 @@ void expect_answer(const Outcome& outcome, const std::string& command, const std
   EXPECT_THAT(outcome.err + outcome.out, HasSubstr(said));
 }
 
+class DamagedShard : public ::testing::TestWithParam<Damage> {
+ protected:
+  /// The set that is damaged: written once, copied for each damage.
+  static void SetUpTestSuite() {
+    whole_ = std::make_unique<Folder>();
+    ASSERT_EQ(run(*whole_, generate()).exit_code, 0);
+  }
+  static void TearDownTestSuite() { whole_.reset(); }
+  static inline std::unique_ptr<Folder> whole_;
+};
+
 TEST_P(DamagedShard, EndsInAMessage) {
   const Folder folder;
-  ASSERT_EQ(run(folder, generate()).exit_code, 0);
+  fs::copy(whole_->path(), folder.path(),
+           fs::copy_options::recursive | fs::copy_options::copy_symlinks);
   fs::copy_file(folder.path("set/shard-00000.h5"), folder.path("outside.h5"));
   change(folder.path("set/shard-00000.h5"), GetParam().edit);
   expect_answer(run(folder, {"validate", "set"}), "validate", GetParam().said);
