@@ -38,7 +38,7 @@ std::string keep(const std::string& name, const std::string& bytes) {
 TEST_P(Fuzz, EveryMutantIsReadOrRefused) {
   const Target& target = GetParam();
   const std::uint64_t first = number_from("TANGERE_FUZZ_FIRST", 0),
-                      end = first + number_from("TANGERE_FUZZ", target.hdf5 ? 40 : 400),
+                      end = first + number_from("TANGERE_FUZZ", target.hdf5 ? 20 : 200),
                       in_child = target.hdf5 ? 20 : 1000;
   const testing::Folder scratch;
   const std::string folder = scratch / "folder";
