@@ -123,12 +123,14 @@ std::uint64_t sum_of(const std::string& shard) {
   return h5::read_numbers<std::uint64_t>(h5::open_file(shard), "content_sum").at(0);
 }
 
+/// `single`: every way of compression, dense and sparse; otherwise these take turns.
 template <class T>
 void check_every_kind(bool single) {
   const Folder folder;
   const std::string plain = write<T>(folder, "plain", layout_of(single, "none", false), false);
   for (const char* compression : {"none", "deflate", "lz4"})
     for (const bool sparse : {false, true}) {
+      if (!single && sparse != (compression == std::string("deflate"))) continue;
       const std::string name = std::string(compression) + (sparse ? "-sparse" : "-dense");
       const DatasetLayout l = layout_of(single, compression, sparse);
       const std::string whole = write<T>(folder, name, l, false);
@@ -215,12 +217,12 @@ std::string write_blocks(const std::string& place, const DatasetLayout& l,
 /// Blocks that wait for an earlier one keep 64 MiB in memory, and the rest in a file without a
 /// name. The order changes no byte.
 TEST(ChunkCodec, BlocksThatWaitTakeBoundedMemoryAndChangeNoByte) {
-  const std::vector<std::int64_t> ascending{0, 16, 32, 48, 64, 80, 96};
+  const std::vector<std::int64_t> ascending{0, 16, 32, 48, 64};
   const std::vector<std::int64_t> descending(ascending.rbegin(), ascending.rend());
   for (const bool sparse : {false, true}) {
     const Folder folder;
     DatasetLayout l = layout_of(true, sparse ? "none" : "lz4", sparse);
-    l.episodes = 112;
+    l.episodes = 80;
     double spilled = 0, none = 0;
     // 20 MB each, none of which goes away.
     const std::string waited =
@@ -272,7 +274,7 @@ TEST(ChunkCodec, WhatTheDiskChangesWhileBlocksWaitIsFound) {
 TEST(ChunkCodec, RowsThatWaitBesideChunksAreBoundedAsWell) {
   const Folder folder;
   DatasetLayout l = layout_of(true, "deflate", false);
-  l.episodes = 112;
+  l.episodes = 80;
   l.gradients_of = "jacobians";
   l.gradients = {{"grad_wide", {64, 64}, true, "numbers that are not compressed", {}, {}}};
   for (int k = 0; k < 64; ++k) {
@@ -281,10 +283,10 @@ TEST(ChunkCodec, RowsThatWaitBesideChunksAreBoundedAsWell) {
   }
   double spilled = 0;
   const std::string shard =
-      write_blocks(folder / "set", l, {96, 80, 64, 48, 32, 16, 0}, false, true, &spilled);
+      write_blocks(folder / "set", l, {64, 48, 32, 16, 0}, false, true, &spilled);
   EXPECT_GT(spilled, static_cast<double>(std::filesystem::file_size(shard)) - (66 << 20));
   const h5::Id file = h5::open_file(shard);
-  for (const int demo : {0, 20, 99}) {
+  for (const int demo : {0, 20, 67}) {
     double number = 0;
     h5::read_box(h5::open_dataset(file, "data/demo_" + std::to_string(demo) + "/grad_wide"),
                  {2, 3, 5}, {1, 1, 1}, &number);
