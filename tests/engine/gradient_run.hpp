@@ -4,8 +4,10 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
+#include <span>
 #include <vector>
 
 #include "engine/derivative/adjoint.hpp"
@@ -177,40 +179,50 @@ inline RunGradient adjoint_of_run(const Model& model, const StepperOptions& opti
   return g;
 }
 
-/// The steps of central differences: four values of a function at each, at e, -e, 2e and -2e.
-inline std::vector<double> difference_steps(double start) {
-  std::vector<double> steps;
-  for (double e = start; e > 1e-5 * start; e *= 0.25) steps.push_back(e);
-  return steps;
-}
-
-/// The central difference of least error; NaN if none settles (a kink). `values`: of the function,
-/// four for each of the steps. A difference's error is estimated as its change from the step
-/// before, plus the effect of rounding. At the smallest steps, which serve runs with a kink or a
-/// split step close by, two differences can agree by chance.
-inline double best_of_differences(const std::vector<double>& steps, const double* values) {
-  constexpr double kRounding = 1e-14;  // of a run's loss, relative
-  double best = NAN, least = HUGE_VAL, before = NAN;
-  for (std::size_t i = 0; i < steps.size(); ++i) {
-    // Richardson's extrapolation removes the error of second order.
-    const double e = steps[i], above = values[4 * i], below = values[4 * i + 1];
-    const double coarse = (values[4 * i + 2] - values[4 * i + 3]) / (4 * e),
-                 fine = (above - below) / (2 * e);
-    const double value = (4 * fine - coarse) / 3;
-    const double rounding = kRounding * (std::abs(above) + std::abs(below)) / e;
-    const double error = std::abs(value - before) + rounding;
-    if (error < least) least = error, best = value;
-    before = value;
+/// Central differences at ever smaller steps, and the one of least error; NaN if none settles (a
+/// kink). A difference's error is estimated as its change from the step before, plus the effect of
+/// rounding. At the smallest steps, which serve runs with a kink or a split step close by, two
+/// differences can agree by chance.
+class CentralDifferences {
+ public:
+  explicit CentralDifferences(double start) : step_(start), last_(1e-5 * start) {}
+  /// Where the next values are taken: at e, -e, 2e and -2e.
+  [[nodiscard]] std::array<double, 4> places() const {
+    return {step_, -step_, 2 * step_, -2 * step_};
   }
-  return best;
-}
+  void add(std::span<const double, 4> values) {
+    // Richardson's extrapolation removes the error of second order.
+    const double above = values[0], below = values[1];
+    const double coarse = (values[2] - values[3]) / (4 * step_),
+                 fine = (above - below) / (2 * step_);
+    const double value = (4 * fine - coarse) / 3;
+    const double rounding = kRounding * (std::abs(above) + std::abs(below)) / step_;
+    const double error = std::abs(value - before_) + rounding;
+    if (error < least_) least_ = error, best_ = value;
+    before_ = value;
+    step_ *= kRatio;
+    // From here on the effect of rounding alone exceeds the least error.
+    finished_ = step_ <= last_ || rounding / kRatio > least_;
+  }
+  [[nodiscard]] bool finished() const { return finished_; }
+  [[nodiscard]] double best() const { return best_; }
+
+ private:
+  static constexpr double kRounding = 1e-14;  // of a run's loss, relative
+  static constexpr double kRatio = 0.25;
+  double step_, last_;
+  double best_ = NAN, least_ = HUGE_VAL, before_ = NAN;
+  bool finished_ = false;
+};
 
 inline double best_difference(const std::function<double(double)>& f, double start) {
-  const std::vector<double> steps = difference_steps(start);
-  std::vector<double> values;
-  for (const double e : steps)
-    for (const double at : {e, -e, 2 * e, -2 * e}) values.push_back(f(at));
-  return best_of_differences(steps, values.data());
+  CentralDifferences differences(start);
+  while (!differences.finished()) {
+    std::array<double, 4> values{};
+    std::ranges::transform(differences.places(), values.begin(), f);
+    differences.add(values);
+  }
+  return differences.best();
 }
 
 /// `complete`: puts what follows from the rest of a start in its place, or empty.
@@ -218,37 +230,41 @@ inline RunGradient differences_of_run(const Model& model, const StepperOptions& 
                                       const RunInput& in, const StateLoss& loss,
                                       double start = 1e-3,
                                       const std::function<void(RunInput&)>& complete = {}) {
-  // All runs with other states and controls go in one batch.
-  const std::vector<double> steps = difference_steps(start);
-  std::vector<RunInput> runs;
-  const auto along = [&](const std::function<void(RunInput&, double)>& change) {
-    for (const double e : steps)
-      for (const double at : {e, -e, 2 * e, -2 * e}) {
-        runs.push_back(in);
-        change(runs.back(), at);
-        if (complete) complete(runs.back());
-      }
-  };
+  std::vector<std::function<void(RunInput&, double)>> directions;
   for (int i = 0; i < model.nv(); ++i) {
-    along([&](RunInput& x, double e) { x.q = moved(model, x.q, i, e); });
-    along([&](RunInput& x, double e) { x.v[std::size_t(i)] += 10 * e; });
+    directions.emplace_back([&, i](RunInput& x, double e) { x.q = moved(model, x.q, i, e); });
+    directions.emplace_back([i](RunInput& x, double e) { x.v[std::size_t(i)] += 10 * e; });
   }
   for (std::size_t t = 0; t < in.u.size(); ++t)
     for (int k = 0; k < model.nu(); ++k)
-      along([&](RunInput& x, double e) { x.u[t][std::size_t(k)] += 10 * e; });
-  const std::vector<double> losses = losses_of_runs(model, options, runs, loss);
-  const double* next = losses.data();
-  const auto difference = [&] {
-    next += 4 * steps.size();
-    return best_of_differences(steps, next - 4 * steps.size());
-  };
-  RunGradient g;
-  for (int i = 0; i < model.nv(); ++i) {
-    g.q.push_back(difference());
-    g.v.push_back(difference() / 10);
+      directions.emplace_back([=](RunInput& x, double e) { x.u[t][std::size_t(k)] += 10 * e; });
+  std::vector<CentralDifferences> found(directions.size(), CentralDifferences(start));
+  // All runs with other states and controls go in one batch for each size of step.
+  while (!std::ranges::all_of(found, &CentralDifferences::finished)) {
+    std::vector<RunInput> runs;
+    for (std::size_t i = 0; i < directions.size(); ++i) {
+      if (found[i].finished()) continue;
+      for (const double e : found[i].places()) {
+        runs.push_back(in);
+        directions[i](runs.back(), e);
+        if (complete) complete(runs.back());
+      }
+    }
+    const std::vector<double> losses = losses_of_runs(model, options, runs, loss);
+    auto next = losses.begin();
+    for (CentralDifferences& differences : found) {
+      if (differences.finished()) continue;
+      differences.add(std::span<const double, 4>(next, 4));
+      next += 4;
+    }
   }
-  for (std::size_t k = 0; k < in.u.size() * std::size_t(model.nu()); ++k)
-    g.u.push_back(difference() / 10);
+  RunGradient g;
+  auto next = found.begin();
+  for (int i = 0; i < model.nv(); ++i) {
+    g.q.push_back((next++)->best());
+    g.v.push_back((next++)->best() / 10);
+  }
+  for (; next != found.end(); ++next) g.u.push_back(next->best() / 10);
   const NumberGradients parameters(model);
   for (int k = 0; k < parameters.count(); ++k) {
     const double size = size_of(parameters.infos()[std::size_t(k)]);
