@@ -64,7 +64,7 @@ std::array<double, 2> errors(const MeshGrid& grid, const Shape& shape, const At&
 TEST(MeshGrid, ErrorsFallWithTheSquareOfTheCell) {
   const double r = 0.02;
   double before = 1;
-  for (int times = 2; times <= 5; ++times) {
+  for (int times = 2; times <= 4; ++times) {
     Draw draw;
     const auto grid = grid_of(ellipsoid_mesh(times, {r, r, r}), 2 << times);
     const auto e = errors(*grid, kernels::SphereDistance<double>{r},
@@ -73,7 +73,7 @@ TEST(MeshGrid, ErrorsFallWithTheSquareOfTheCell) {
     EXPECT_LT(e[1], 0.45 / (1 << times));  // triangles are flat, so normals err by their size
     before = e[0];
   }
-  EXPECT_LT(before, 0.0004 * r);
+  EXPECT_LT(before, 0.0016 * r);
 }
 
 TEST(MeshGrid, IsTheDistanceToTheSameShapeAsAPrimitive) {
@@ -339,7 +339,7 @@ TEST(MeshGrid, TheFitOfARoundBodyIsItsError) {
 
 /// An error counts at the scale of the mesh.
 TEST(MeshGrid, AnErrorChoosesTheCells) {
-  MeshShape mesh = ellipsoid_mesh(4, {0.02, 0.02, 0.02});
+  MeshShape mesh = ellipsoid_mesh(3, {0.02, 0.02, 0.02});
   mesh.resolution = 16;
   const auto first = shared_mesh_grid(mesh);
   const double coarse = first->fit.error;
@@ -355,7 +355,7 @@ TEST(MeshGrid, AnErrorChoosesTheCells) {
   mesh.scale = 1;
   mesh.error = 0;
   EXPECT_EQ(fitting_mesh_grid(mesh), shared_mesh_grid(mesh));
-  mesh = cuboid_mesh({0.01, 0.02, 0.01});
+  mesh = cuboid_mesh({0.001, 0.02, 0.001});  // slender: most cells along it are few in all
   mesh.error = 1e-12;
   const auto fault = [&] {
     try {
