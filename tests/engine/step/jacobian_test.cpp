@@ -233,7 +233,9 @@ TEST_P(JointEffectJacobian, MatchesDualNumbersAndActs) {
   StageBuffers<double> b(*m), plain(*without);
   Random random(17);
   int acting = 0, felt = 0;
-  for (int k = 0; k < 1000; ++k) {
+  // Few random states lie beyond a limit.
+  const int states = effect == Effect::limit ? 1000 : 60;
+  for (int k = 0; k < states; ++k) {
     testing::randomise(b, *m, random, kStep);
     compare_with_dual_numbers(*m, b, 1e-11);
     copy_stage(b, plain);
@@ -259,12 +261,12 @@ class ContactJacobian : public ::testing::TestWithParam<ContactLaw> {};
 
 TEST_P(ContactJacobian, ContactsMatchDualNumbers) {
   int touched = 0;
-  for (unsigned seed = 1; seed <= 200; ++seed) {
+  for (unsigned seed = 1; seed <= 80; ++seed) {
     const auto m =
         compile(testing::random_contacts(seed, 2 + static_cast<int>(seed % 5), GetParam()));
     StageBuffers<double> b(*m);
     Random random(seed);
-    for (int k = 0; k < 5; ++k) {
+    for (int k = 0; k < 3; ++k) {
       testing::randomise(b, *m, random, kStep);
       SCOPED_TRACE("seed " + std::to_string(seed));
       compare_with_dual_numbers(*m, b, 1e-11);
@@ -276,7 +278,7 @@ TEST_P(ContactJacobian, ContactsMatchDualNumbers) {
 
 TEST_P(ContactJacobian, ContactsMatchCentralDifferences) {
   int compared = 0, kinks = 0;
-  for (unsigned seed = 101; seed <= 300; ++seed) {
+  for (unsigned seed = 101; seed <= 160; ++seed) {
     const auto m = compile(testing::random_contacts(seed, 3, GetParam()));
     StageBuffers<double> b(*m), moved(*m);
     Random random(seed);
