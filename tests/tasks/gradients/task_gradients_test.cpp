@@ -32,7 +32,7 @@ struct Checked {
   PolicyKind policy;
   std::int64_t actions;
   std::int64_t episode = 0;
-  int entries = 6;
+  int entries = 4;
 };
 void PrintTo(const Checked& c, std::ostream* out) {
   *out << c.task << " " << to_string(c.policy) << " " << c.actions;
