@@ -25,8 +25,8 @@ using ::testing::IsEmpty;
 using ::testing::SizeIs;
 
 constexpr std::uint64_t kSeed = 5;
-constexpr int kSteps = 60;  // the pad is on the ball from step 40 or so
-constexpr int kEvery = 15;
+constexpr int kSteps = 80;  // the pad is on the ball from step 40 or so
+constexpr int kEvery = 20;
 
 const Model& small_ball() {
   static const Model model(read_scene(TANGERE_SOURCE_DIR "/scenes/rolling_ball_small.xml").scene);
