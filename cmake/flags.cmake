@@ -19,7 +19,7 @@ target_include_directories(tangere_flags INTERFACE $<BUILD_INTERFACE:${PROJECT_S
 set(precompiled_warnings
   "$<$<CXX_COMPILER_ID:GNU>:-Wno-array-bounds;-Wno-stringop-overflow;-Wno-stringop-overread>")
 
-# ./run-demo and ./run-tests build once and compile 24 sources as one, in half of the time. ./dev
+# ./run-demo and ./run-tests build once and compile 24 sources as one, which parses their headers once. ./dev
 # does not: a change then recompiles one source, and a missing include is found.
 set(CMAKE_UNITY_BUILD_BATCH_SIZE 24)
 if(CMAKE_UNITY_BUILD AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")

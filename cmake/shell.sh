@@ -110,11 +110,11 @@ check_cmake() {
       "Debian 12, Ubuntu 23.04 and all later ones have it."
 }
 
-# One compiler per core, but no more than memory allows: the largest files take about 1 GiB each.
+# One compiler per core, but no more than memory allows: the largest units take 2 GiB each under the sanitizers.
 jobs() {
   local cores memory
   cores=$(nproc)
-  memory=$(awk '/^MemAvailable:/ { print int($2 / 1048576) }' /proc/meminfo)
+  memory=$(awk '/^MemAvailable:/ { print int($2 / 2097152) }' /proc/meminfo)
   if [ "${memory:-0}" -lt 1 ]; then memory=1; fi
   if [ "$cores" -lt "$memory" ]; then echo "$cores"; else echo "$memory"; fi
 }

@@ -47,7 +47,7 @@ bool counting = false;  // all kinds
 long failing = -1;      // -1: not loaded yet
 /// Calls by kind; of the one that fails where none are counted.
 struct Calls {
-  std::atomic<long> by_kind[std::size(kKinds)], failing;
+  std::atomic<long> counts[std::size(kKinds)], failing;
 };
 Calls unshared{};
 Calls* calls = &unshared;  // of the program and of its child processes together
@@ -84,7 +84,7 @@ bool fails(const char* of) {
   if (failing < 0) return false;
   if (!counting) return std::strcmp(of, kind) == 0 && ++calls->failing == failing;
   for (std::size_t k = 0; k < std::size(kKinds); ++k)
-    if (std::strcmp(of, kKinds[k]) == 0) ++calls->by_kind[k];
+    if (std::strcmp(of, kKinds[k]) == 0) ++calls->counts[k];
   return false;
 }
 
@@ -116,7 +116,7 @@ __attribute__((destructor)) void report() {
   failing = -1;
   if (std::FILE* const file = std::fopen(path, "w")) {
     for (std::size_t k = 0; k < std::size(kKinds); ++k)
-      std::fprintf(file, "%s %ld\n", kKinds[k], calls->by_kind[k].load());
+      std::fprintf(file, "%s %ld\n", kKinds[k], calls->counts[k].load());
     std::fclose(file);
   }
 }

@@ -187,6 +187,11 @@ expect "names what was not tested" prints "release: the Python module and its te
 lacks openmpi-bin
 run run-tests
 expect "installs what tests need" called "install -y --no-install-recommends openmpi-bin"
+lacks openmpi-bin
+run FAKE_INSTALL=100 run-tests
+expect "fails without what tests need" fails
+expect "says what could not be installed" prints "apt-get could not install the packages"
+run run-tests
 test_in release false
 run run-tests
 expect "fails with a test" fails
