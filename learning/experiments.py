@@ -56,6 +56,7 @@ THROUGH_TIME = "gd.py box_pushing --touch 0.05"
 CLONED = "dagger.py out/learning/pushes --rounds 60 --updates 100"
 TURNED = "dagger.py out/learning/turns --rounds 10 --updates 150 --visits 200"
 SEEN = "pictures.py out/learning/pictures"
+INSERTED = "pictures.py out/learning/inserts --task insertion --demos 5000 --epochs 60"
 CAPPED = "bc.py out/learning/caps --epochs 20 --before 3 --width 512"
 
 OTHER_SKINS = {
@@ -109,6 +110,13 @@ EXPERIMENTS = [
            "camera and pictures with markers"),
           ("eye", "eye", "camera on the hand"),
           ("gels", "left.rgb right.rgb", "pictures of both gels, without markers"))),
+    *(Experiment(f"insertion-{name}", f"{INSERTED} --see {keys}", 2, seconds, text)
+      for name, keys, seconds, text in (
+          ("flow", "flow", 200, "flow of both pads"),
+          ("markers", "left.rgb_marker right.rgb_marker left.rgb_marker_grip right.rgb_marker_grip",
+           400, "pictures with markers, at the grip and on the rim"),
+          ("gels", "left.rgb right.rgb left.rgb_grip right.rgb_grip", 400,
+           "pictures without markers, at the grip and on the rim"))),
     *(Experiment(f"match-{name}", f"matching.py out/learning/derived --match {weight}", 3, 60,
                  text, data=f"derived {DERIVED}")
       for name, weight, text in (("none", 0, "rows alone"), ("some", 0.01, "weight 0.01"),

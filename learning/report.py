@@ -166,6 +166,12 @@ def tables() -> str:
         ("see-",),
         lambda runs: [rate(runs), until(runs), f"{runs[0]['rows']}", cost(runs)],
     )
+    inserted = table(
+        "| clone of insertion by | success | script | actions until it | rows | CPU [s] | runs |",
+        ("insertion-",),
+        lambda runs: [rate(runs), f"{100 * runs[0]['script']['success']:.1f} %", until(runs),
+                      f"{runs[0]['rows']}", cost(runs)],
+    )  # fmt: skip
     skins = table(
         "| PPO of stable grasp on | " + " | ".join(SKINS) + " | runs |", ("skin-",),
         lambda runs: [rate([run | {"test": run["tests"].get(skin, run["test"])} for run in runs])
@@ -182,8 +188,8 @@ def tables() -> str:
     ))  # fmt: skip
     picture = "![Return against actions of training](results/box_pushing.svg)\n" if figure() else ""
     parts = (pushed, published("Place [m] and yaw [rad]", of_pushing), picture, reinforced,
-             published("Success, and actions until it", of_tasks), cloned, seen, skins, offline,
-             matched, earlier(), unclean(), missing())  # fmt: skip
+             published("Success, and actions until it", of_tasks), cloned, seen, inserted, skins,
+             offline, matched, earlier(), unclean(), missing())  # fmt: skip
     return "\n" + "\n".join(filter(None, parts)) + "\n"
 
 
