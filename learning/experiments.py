@@ -86,7 +86,11 @@ EXPERIMENTS = [
     Experiment("ppo-cap", "ppo.py cap_opening", 5, 300,
                "cap, touch, imitates 4/5", "87.3 %", first_seed=5),
     *(Experiment(f"skin-{skin}", f"ppo.py stable_grasp --skin {skin} {OTHER_SKINS[skin]}", 3, 60,
-                 skin)
+                 f"stable grasp on {skin}")
+      for skin in ("springs", "layer")),
+    *(Experiment(f"skin-{skin}-insertion",
+                 f"ppo.py insertion_translation --skin {skin} {OTHER_SKINS[skin]}", 3, 100,
+                 f"insertion, x and y, on {skin}")
       for skin in ("springs", "layer")),
     Experiment("bc-push", CLONED, 3, 450, "box pushing, goal and touch, visits",
                data=f"pushes {PUSHES}", first_seed=5),
