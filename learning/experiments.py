@@ -114,9 +114,9 @@ EXPERIMENTS = [
            "camera and pictures with markers"),
           ("eye", "eye", "camera on the hand"),
           ("gels", "left.rgb right.rgb", "pictures of both gels, without markers"))),
-    *(Experiment(f"insertion-{name}", f"{INSERTED} --see {keys}", 2, seconds, text)
+    *(Experiment(f"insertion-{name}", f"{INSERTED} --see {keys}", 1, seconds, text)
       for name, keys, seconds, text in (
-          ("flow", "flow", 200, "flow of both pads"),
+          ("flow", "flow", 590, "flow of both pads"),
           ("markers", "left.rgb_marker right.rgb_marker left.rgb_marker_grip right.rgb_marker_grip",
            400, "pictures with markers, at the grip and on the rim"),
           ("gels", "left.rgb right.rgb left.rgb_grip right.rgb_grip", 400,
