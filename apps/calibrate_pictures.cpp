@@ -12,7 +12,9 @@
 #include "apps/text_output.hpp"
 #include "engine/base/error.hpp"
 #include "io/files/csv.hpp"
+#include "io/files/jpeg_file.hpp"
 #include "io/files/png_file.hpp"
+#include "io/files/text_file.hpp"
 #include "io/scene/gel_file.hpp"
 #include "tasks/calibration/gel_fit.hpp"
 
@@ -21,6 +23,10 @@ namespace {
 
 constexpr const char* kTable = "presses.csv";
 constexpr const char* kBackground = "background.png";
+constexpr double kLongest = 0.1;     // of a ball and of a pixel [m], as of a gel file
+constexpr float kLeastChange = 3;    // of a photograph by its press [grey levels]
+constexpr double kMostGrowth = 1.3;  // of the radius of a label, either way, that is not doubted
+constexpr double kMostMove = 0.5;    // of its place, by its radius
 
 struct Photographs {
   GelBackground background;
@@ -31,6 +37,29 @@ struct Photographs {
 
 std::string in_folder(const std::string& folder, const std::string& file) {
   return (std::filesystem::path(folder) / file).string();
+}
+
+/// Reads a photograph as PNG or JPEG.
+Photograph read_photograph(const std::string& path) {
+  constexpr std::size_t kMostBytes = std::size_t{256} << 20;
+  const std::string bytes = read_text_file(path, kMostBytes, "a picture as PNG or JPEG");
+  return bytes.starts_with("\xFF\xD8") ? parse_jpeg(bytes, path) : parse_png(bytes, path);
+}
+
+/// Largest change of a level within the circle of a press.
+float largest_change(const BallPress& press, const GelBackground& background) {
+  float most = 0;
+  for (int i = 0; i < background.rows; ++i)
+    for (int j = 0; j < background.cols; ++j) {
+      const double x = j + 0.5 - press.label.x, y = i + 0.5 - press.label.y;
+      if (x * x + y * y > press.label.radius * press.label.radius) continue;
+      for (std::size_t c = 0; c < kColours; ++c) {
+        const std::size_t k =
+            kColours * (std::size_t(i) * std::size_t(background.cols) + std::size_t(j)) + c;
+        most = std::max(most, std::abs(press.levels[k] - background.levels[k]));
+      }
+    }
+  return most;
 }
 
 BallPress read_ball_press(const NamedFields& table, const NamedFields::Row& row,
@@ -49,7 +78,7 @@ BallPress read_ball_press(const NamedFields& table, const NamedFields::Row& row,
   if (!(*std::ranges::min_element(gains) > 0))
     throw InputError(row.place + "a gain that is not positive; expected positive numbers");
   const std::string path = in_folder(folder, row.fields[*table.find("file")]);
-  const Photograph photograph = read_png(path);
+  const Photograph photograph = read_photograph(path);
   if (photograph.rows != background.rows || photograph.cols != background.cols)
     throw InputError(
         fmt::format("{}{} has {} x {} pixels, the background {} x {}; expected one size", row.place,
@@ -62,6 +91,11 @@ BallPress read_ball_press(const NamedFields& table, const NamedFields::Row& row,
     throw InputError(fmt::format(
         "{}an imprint at ({}, {}) of radius {} pixels; expected a circle in the picture", row.place,
         at.x, at.y, at.radius));
+  if (const float change = largest_change(press, background); !(change >= kLeastChange))
+    throw InputError(fmt::format(
+        "{}{} differs from the background by {:.2g} levels at most within its circle; expected a "
+        "press, {} levels or more",
+        row.place, path, change, kLeastChange));
   return press;
 }
 
@@ -91,6 +125,20 @@ std::string folder_name(const std::string& folder) {
 /// How far a label was moved [pixels].
 double moved(const BallPress& press, const PressScore& score) {
   return std::hypot(score.refined.x - press.label.x, score.refined.y - press.label.y);
+}
+
+/// Doubts labels that the fit took far away: one of them spoils the lamps.
+void note_doubtful_labels(const Photographs& of, const GelFit& fit, const Console& console) {
+  for (std::size_t k = 0; k < fit.scores.size(); ++k) {
+    const double labelled = of.presses[k].label.radius, found = fit.scores[k].refined.radius,
+                 by = moved(of.presses[k], fit.scores[k]);
+    const bool grown = found > kMostGrowth * labelled || labelled > kMostGrowth * found;
+    if (!grown && by <= kMostMove * labelled) continue;
+    console.note(fmt::format(
+        "warning: {}: the circle of radius {:.4g} pixels became one of {:.4g} and moved by {:.3g} "
+        "pixels; a wrong label spoils the fit: mend it or leave the press out",
+        of.files[k], labelled, found, by));
+  }
 }
 
 std::string scores_text(const Photographs& of, const GelFit& fit) {
@@ -145,6 +193,9 @@ int run_calibrate_pictures(const PictureCalibration& a, const Console& console) 
     throw InputError(
         "--pictures without --ball or --pixel; expected the ball's radius and the side "
         "of a pixel [m]");
+  for (const auto& [name, length] : {std::pair{"--ball", *a.ball}, {"--pixel", *a.pixel}})
+    if (!(length <= kLongest))
+      throw InputError(fmt::format("{} {}; expected metres, {} at most", name, length, kLongest));
   std::optional<PartFile> xml, png;
   const std::filesystem::path path(a.output);
   const std::string picture = path.stem().string() + "_background.png";
@@ -155,6 +206,7 @@ int run_calibrate_pictures(const PictureCalibration& a, const Console& console) 
   const Photographs photographs = read_photographs(a.folder);
   const GelFit fit = fit_gel(photographs.background, photographs.presses, *a.ball, *a.pixel);
   console.print(scores_text(photographs, fit));
+  note_doubtful_labels(photographs, fit, console);
   if (xml) {
     const PressScore mean = fit.mean();
     const std::string text = gel_text(fit.gel, picture,

@@ -236,6 +236,17 @@ void check(GenerateOptions& options, const Console& console) {
   }
 }
 
+/// Names observations that learners do not read, because they are not in every row.
+void note_samples(const DatasetLayout& layout, const Console& console) {
+  std::vector<std::string> names;
+  for (const DatasetSample& sample : layout.samples()) names.push_back(sample.name);
+  if (!names.empty())
+    console.note(fmt::format(
+        "not in every row, so below samples, where learners and exports do not see them: {}; with "
+        "--every as long as their interval they are in each row",
+        fmt::join(names, ", ")));
+}
+
 int generate(GenerateOptions options, const Console& console, const ProgramInfo& info) {
   check(options, console);
   // The same for the episodes and their gradients, which play them again.
@@ -274,6 +285,7 @@ int generate(GenerateOptions options, const Console& console, const ProgramInfo&
   job.effects = effect_names(model);
   job.moving_bodies = model.moving_bodies();
   job.layout = make_layout(options, model, stepper, job.run, info, plan);
+  note_samples(job.layout, console);
   job.simulate = [&](const EpisodeOptions& run, EpisodeSink& sink, const ProgressCallback& progress,
                      const std::stop_token& stop) -> JobResult {
     return {with_gradients(plan_of(run), sink,

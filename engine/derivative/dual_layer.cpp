@@ -26,9 +26,10 @@ kernels::Touch<double> values(const kernels::Touch<D>& t, const Coefficients<D>&
 
 void read_dual_layer(const CompiledModel& m, int sensor,
                      std::span<const kernels::LinkScratch<D>> links,
-                     const Coefficients<D>& coefficients, const double* column,
-                     std::span<const double> numbers, const DualSprings& springs,
-                     std::span<double> field, std::span<double> field_dot) {
+                     const Coefficients<D>& coefficients, const LayerMaterial& material_dot,
+                     const double* column, std::span<const double> numbers,
+                     const DualSprings& springs, std::span<double> field,
+                     std::span<double> field_dot) {
   const CompiledSensor& s = m.sensors[std::size_t(sensor)];
   std::vector<double> whole(field_dot.size()), whole_dot(whole), normal(whole), normal_dot(whole);
   Coefficients<D> smooth = coefficients;
@@ -58,7 +59,8 @@ void read_dual_layer(const CompiledModel& m, int sensor,
   std::vector<double> own(whole.size());
   layered.read(s, a, {whole, normal}, own);
   if (!field.empty()) std::copy(own.begin(), own.end(), field.begin());
-  layered.push_forward({whole_dot, normal_dot}, touches, sizes, coefficients.kn.epsilon, field_dot);
+  layered.push_forward({whole_dot, normal_dot}, touches, sizes, coefficients.kn.epsilon,
+                       material_dot, field_dot);
 }
 
 }  // namespace tangere

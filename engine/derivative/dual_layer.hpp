@@ -16,7 +16,8 @@ using DualSprings = std::function<void(const Coefficients<kernels::Dual<double>>
 /// Computes the outputs of DualStage::field().
 void read_dual_layer(const CompiledModel& m, int sensor,
                      std::span<const kernels::LinkScratch<kernels::Dual<double>>> links,
-                     const Coefficients<kernels::Dual<double>>& coefficients, const double* column,
+                     const Coefficients<kernels::Dual<double>>& coefficients,
+                     const LayerMaterial& material_dot, const double* column,
                      std::span<const double> numbers, const DualSprings& springs,
                      std::span<double> field, std::span<double> field_dot);
 

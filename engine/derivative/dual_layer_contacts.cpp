@@ -36,7 +36,9 @@ kernels::Anchor<D> anchor_at(const std::vector<D>& all, std::size_t k) {
 }  // namespace
 
 DualLayerContacts::DualLayerContacts(const CompiledModel& model)
-    : pads_(model.layer_pads), sums_(std::size_t(model.layer_link_pairs)) {}
+    : pads_(model.layer_pads),
+      sums_(std::size_t(model.layer_link_pairs)),
+      materials_(model.layer_pads.size()) {}
 
 /// Copies the values of a pair's candidates.
 LayerCandidates DualLayerContacts::values_in_rows(const DualCandidates& candidates,
@@ -75,7 +77,8 @@ void DualLayerContacts::add_bodies(const kernels::ModelView& view, const kernels
 
 void DualLayerContacts::compute(const kernels::ModelView& view,
                                 std::span<const kernels::ContactScratch<D>> contacts,
-                                const DualCandidates& candidates, const double* block) {
+                                const DualCandidates& candidates, const double* block,
+                                bool frozen) {
   std::fill(sums_.begin(), sums_.end(), kernels::PairSums<D>::zero());
   for (std::size_t g = 0; g < std::size_t(view.n_link_pairs); ++g) {
     const kernels::LinkPair& links = view.link_pairs[g];
@@ -92,7 +95,9 @@ void DualLayerContacts::compute(const kernels::ModelView& view,
             anchor_at(candidates.anchors[pair], static_cast<std::size_t>(p.candidate))));
       });
       const kernels::Vec6<double> value = contact_.wrench(),
-                                  change = contact_.change(bodies_, anchors);
+                                  change = contact_.change(
+                                      bodies_, anchors,
+                                      frozen ? LayerMaterial{} : materials_[std::size_t(pad)]);
       sums_[std::size_t(links.layer)].wrench +=
           {joined(value.a, change.a), joined(value.l, change.l)};
     }

@@ -25,8 +25,11 @@ class DualLayerContacts {
 
   /// Computes the wrenches. `view`: with parameters in rows of `block`. `contacts`: motions of the
   /// link pairs.
+  /// `frozen`: the material does not change.
   void compute(const kernels::ModelView& view, std::span<const kernels::ContactScratch<D>> contacts,
-               const DualCandidates& candidates, const double* block);
+               const DualCandidates& candidates, const double* block, bool frozen);
+  /// Sets how the material of a pad's layer changes along the tangents. Stays zero until then.
+  void set_material(std::size_t pad, const LayerMaterial& dot) { materials_[pad] = dot; }
   /// As StageArgs::layer_sums, wrenches alone.
   [[nodiscard]] const kernels::PairSums<D>* sums() const { return sums_.data(); }
 
@@ -38,6 +41,7 @@ class DualLayerContacts {
 
   const std::vector<LayerPad>& pads_;
   std::vector<kernels::PairSums<D>> sums_;
+  std::vector<LayerMaterial> materials_;  // (pads) tangents
   LayerContact contact_;
   std::vector<int> members_;                   // pairs of its bodies
   std::vector<kernels::LayerBody<D>> bodies_;  // parallel

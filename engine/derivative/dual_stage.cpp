@@ -55,6 +55,8 @@ void DualStage::set_numbers(const double* column, std::span<const double> tangen
       return D(p.row < 0 ? p.value : column[p.row * kBlock], tangent);
     });
   }
+  for (std::size_t k = 0; k < i.m.layer_pads.size(); ++k)
+    i.layers.set_material(k, i.material_tangent(i.m.layer_pads[k].sensor, tangents));
   i.heavier = std::any_of(i.inertia.begin(), i.inertia.end(), [](double t) { return t != 0; });
 }
 
@@ -161,7 +163,7 @@ void DualStage::residual() {
   kernels::kinematics(i.view, a);
   i.find_touching();
   i.layers.compute(i.view, i.contacts, {i.points, i.listed_points, i.listed_anchors},
-                   i.block.data());
+                   i.block.data(), i.frozen);
   i.put_ground_anchors();
   i.put_dry_anchors();
   kernels::residual<false>(i.view, a);
@@ -192,7 +194,8 @@ void DualStage::field(int sensor, const double* column, std::span<const double> 
   if (!skin.layer) return springs(coefficients, skin.elastic, field, field_dot);
   if (!points.empty())
     throw InputError("derivatives by points of a sensor with a layer or a table; expected springs");
-  read_dual_layer(i.m, sensor, i.links, coefficients, column, numbers, springs, field, field_dot);
+  read_dual_layer(i.m, sensor, i.links, coefficients, i.material_tangent(sensor, numbers), column,
+                  numbers, springs, field, field_dot);
 }
 
 /// Field of a sensor with shear springs: the contact law at the state `centre` with twist r and its

@@ -57,6 +57,12 @@ struct DualStage::Impl {
   std::vector<std::vector<double>> point_tangents;   ///< of each sensor; empty: zeros
   std::vector<kernels::Vec3<double>> touched_sizes;  ///< of each body in this environment
 
+  /// Returns the tangents of the material of a sensor's layer; `all`: of every number, or none.
+  [[nodiscard]] LayerMaterial material_tangent(int sensor, std::span<const double> all) const {
+    const auto row = std::size_t(m.layer_row(sensor));
+    return all.size() > row + 1 ? LayerMaterial{all[row], all[row + 1]} : LayerMaterial{};
+  }
+
   explicit Impl(const CompiledModel& model)
       : m(model),
         view(model.view),

@@ -16,7 +16,7 @@ namespace {
 /// Subtracts the shares of the solved layer of one lane.
 template <int L>
 void subtract_shares(const CompiledModel& m, BasicWorkspace<L>& w, const Vec6<double>& slip,
-                     int lane, LossRows<L>& loss) {
+                     int pad, int lane, LossRows<L>& loss) {
   LayerContact& contact = *w.layer_contact;
   std::vector<kernels::LayerBody<LayerContact::D>> bodies = contact.still_bodies();
   for (std::size_t b = 0; b < bodies.size(); ++b) {
@@ -31,6 +31,9 @@ void subtract_shares(const CompiledModel& m, BasicWorkspace<L>& w, const Vec6<do
     for (int i = 0; i < kernels::kSizeNumbers; ++i)
       subtract(m.view.rows.solid(m.pairs[std::size_t(k)].body2) + i, (&bodies[b].size.x)[i]);
   }
+  const int row = m.layer_row(m.layer_pads[std::size_t(pad)].sensor);
+  loss.parameters[row][lane] -= dot(slip, contact.change(bodies, {}, {1, 0}));
+  loss.parameters[row + 1][lane] -= dot(slip, contact.change(bodies, {}, {0, 1}));
 }
 
 }  // namespace
@@ -50,7 +53,7 @@ void add_layer_parameters(const CompiledModel& m, const kernels::KernelTable& ta
       const LinkPose<double> one = pose_of<L>(poses, links.link1, l),
                              two = pose_of<L>(poses, links.link2, l);
       const Vec6<double> slip = motion_to_parent(relative(one.world, two.world), two.V) - one.V;
-      subtract_shares(m, w, slip, l, loss);
+      subtract_shares(m, w, slip, pad, l, loss);
     }
   });
 }

@@ -36,12 +36,13 @@ void NumberGradients::add(const SceneNumber& number, Terms terms, int body) {
 }
 
 /// Whether a coefficient has no derivative: with ks = 0 there is no shear state, and kn of a layer
-/// with markers or pictures is constant (compile.cpp).
+/// that is the contact, or has markers or pictures, is constant (compile.cpp).
 static bool is_constant(const Scene& scene, const SceneNumber& of) {
   if (of.field == Field::ks) return number_in(scene, of) == 0 && randomization_of(scene, of) < 0;
   return of.field == Field::kn && of.owner == Owner::tactile &&
          std::any_of(scene.sensors.begin(), scene.sensors.end(), [&](const auto& sensor) {
-           return sensor.name == of.name && sensor.layer && (sensor.markers || sensor.picture);
+           return sensor.name == of.name && sensor.layer &&
+                  (sensor.markers || sensor.picture || sensor.layer->feedback);
          });
 }
 
@@ -74,6 +75,13 @@ void NumberGradients::add_contacts() {
     add_coefficients(first_number(c), {rows.ground(k++)});
   k = 0;
   for (const auto& t : m.scene.sensors) add_coefficients(first_number(t), {rows.sensor(k++)});
+  // How the surface that a camera sees follows from the material is not worked out.
+  for (k = 0; k < static_cast<int>(m.sensors.size()); ++k) {
+    const TactileDescription& t = m.scene.sensors[std::size_t(k)];
+    if (!t.layer || t.markers || t.picture) continue;
+    add({Owner::tactile, Field::thickness, t.name}, {{m.layer_row(k), 1}});
+    add({Owner::tactile, Field::poisson, t.name}, {{m.layer_row(k) + 1, 1}});
+  }
 }
 
 namespace {

@@ -22,8 +22,9 @@ struct NumberInfo {
 };
 
 /// Coefficients of contacts and sensors, densities (or masses) and sizes of bodies, effects and
-/// places of joints, gains of motors, numbers of loops. Each appears once: a number that a scene
-/// gives for a whole joint has one derivative. Every gradient by them has their order.
+/// places of joints, gains of motors, numbers of loops and of the material of layers. Each appears
+/// once: a number that a scene gives for a whole joint has one derivative. Every gradient by them
+/// has their order.
 class NumberGradients {
  public:
   explicit NumberGradients(const Model& model);

@@ -169,9 +169,14 @@ struct ReadoutPullback::Impl {
     read_layered(s, lane, pressure, std::span(expanded).first(numbers));
     LayeredField::Cotangents& bar = layered.pull_back(layer_bar, !parameters.empty(),
                                                       std::span(touches).first(s.targets.size()));
-    if (!parameters.empty())
-      parameters[std::size_t(compiled(model).view.rows.sensor(s.number) * kBlock + lane)] +=
-          bar.stiffness;
+    const auto add = [&](int row, double x) {
+      if (!parameters.empty()) parameters[std::size_t(row * kBlock + lane)] += x;
+    };
+    add(compiled(model).view.rows.sensor(s.number), bar.stiffness);
+    if (!s.layer->table) {
+      const int row = compiled(model).layer_row(s.number);
+      add(row, bar.material.thickness), add(row + 1, bar.material.poisson);
+    }
     add_touches(lane, s, parameters);
     if (!pressure) pull_back_springs(lane, s, bar.whole, parameters);
     for (std::size_t k = 0; pressure && k < numbers; ++k) bar.normal[k] += bar.whole[k];
@@ -199,8 +204,12 @@ struct ReadoutPullback::Impl {
     reading->set_touches(touch);
     reading->set_draws(key_of(*batch, kBlock * block + lane));
     const auto bars = std::span(touches).first(s.targets.size());
-    reading->pull_back_touches(of.form, touch, cotangent, !parameters.empty(), bars);
+    layer_bar.assign(reading->needs_field(of.form) ? field.size() : 0, 0.0);
+    reading->pull_back_touches(of.form, touch, cotangent, !parameters.empty(), bars, layer_bar);
     add_touches(lane, s, parameters);
+    if (layer_bar.empty()) return;
+    const std::vector<double> field_bar = layer_bar;  // of a table, which has scratch of that name
+    pull_back_ideal(lane, s, false, field_bar, parameters, {});
   }
 
   /// Adds the cotangents of motions and sizes in `touches`.

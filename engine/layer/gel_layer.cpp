@@ -334,8 +334,56 @@ void GelLayer::pull_back(std::span<const double> pressure_bar, std::span<double>
   }
 }
 
-void GelLayer::push_forward(std::span<const double> depth_dot, std::span<double> pressure_dot) {
+/// Computes how C' P of the near cells changes with t and ν where P stays.
+void GelLayer::change_coupling(const LayerMaterial& by, std::vector<double>& out) const {
+  const LayerSlopes& of = layer_->slopes.at(layer_->grid);
+  const auto n = static_cast<std::size_t>(layer_->grid.cells());
+  const double own = layer_->own_change(by);
+  for (const int i : near_) {
+    const auto at = static_cast<std::size_t>(i);
+    double sum = -own * load_[at];
+    for (const int j : pressing_) {
+      const std::size_t cells = at * n + std::size_t(j);
+      sum += (by.thickness * of.thickness.table[cells] + by.poisson * of.poisson.table[cells]) *
+             load_[static_cast<std::size_t>(j)];
+    }
+    out[at] = sum;
+  }
+}
+
+// With λ and w̄ of pull_back(): dL = w̄·dC' P - λ·dM P, dM = dC' + diag(m²/n_i) dC(0), and where
+// R is 0, p = k max(0, δ - w) with dk = -k² dC(0).
+LayerMaterial GelLayer::pull_back_material(std::span<const double> pressure_bar) const {
+  const double whole = layer_->side * layer_->side;
+  std::vector<double> change(load_.size());
+  const auto along = [&](const LayerMaterial& by) {
+    const double own = layer_->own_change(by);
+    change_coupling(by, change);
+    double sum = 0;
+    for (const int i : near_) {
+      const auto at = static_cast<std::size_t>(i);
+      const double slip = count_[at] > 0 ? load_bar_[at] : 0;
+      sum += (yield_bar_[at] - slip) * change[at];
+      if (count_[at] > 0) sum -= slip * whole / count_[at] * own * load_[at];
+    }
+    for (const int s : touching_) {
+      const std::size_t i = cell(s), at = static_cast<std::size_t>(s);
+      if (sum_[i] > 0 || presses_[at] == 0) continue;
+      sum -= modulus_ * pressure_bar[at] * stiffness_ * stiffness_ * own *
+             std::max(0.0, depth_[at] - yield_[i]);
+    }
+    return sum;
+  };
+  return {along({1, 0}), along({0, 1})};
+}
+
+void GelLayer::push_forward(std::span<const double> depth_dot, const LayerMaterial& material_dot,
+                            std::span<double> pressure_dot) {
   const int whole = layer_->side * layer_->side;
+  const bool changes = material_dot.thickness != 0 || material_dot.poisson != 0;
+  const double own_dot = layer_->own_change(material_dot);
+  std::vector<double> coupling_dot(changes ? load_.size() : 0);
+  if (changes) change_coupling(material_dot, coupling_dot);
   std::vector<double>&load_dot = load_bar_, &yield_dot = yield_bar_;
   for (const int i : near_) load_dot[static_cast<std::size_t>(i)] = 0;
   for (const int s : touching_) {
@@ -343,10 +391,17 @@ void GelLayer::push_forward(std::span<const double> depth_dot, std::span<double>
     if (presses_[at] != 0) load_dot[i] += depth_dot[at] / count_[i];
   }
   rhs_.clear();
-  for (const int i : pressing_) rhs_.push_back(load_dot[static_cast<std::size_t>(i)]);
+  for (const int i : pressing_) {
+    const auto at = static_cast<std::size_t>(i);
+    rhs_.push_back(load_dot[at]);
+    if (changes) rhs_.back() -= coupling_dot[at] + whole * own_dot / count_[at] * load_[at];
+  }
   solve_system();
   put_solution(load_dot);
   couple(pressing_, load_dot, near_, yield_dot);
+  for (const int i : near_)
+    if (changes)
+      yield_dot[static_cast<std::size_t>(i)] += coupling_dot[static_cast<std::size_t>(i)];
   std::vector<double> left_dot(layer_->feedback ? 0 : depth_.size()),
       sum_dot(layer_->feedback ? 0 : sum_.size());
   for (const int s : touching_) {
@@ -368,7 +423,8 @@ void GelLayer::push_forward(std::span<const double> depth_dot, std::span<double>
           whole / sum_[i] *
           (load_dot[i] * left_[at] + load_[i] * (left_dot[at] - left_[at] * sum_dot[i] / sum_[i]));
     else if (presses_[at] != 0)
-      own = stiffness_ * (depth_dot[at] - yield_dot[i]);
+      own = stiffness_ * (depth_dot[at] - yield_dot[i] -
+                          stiffness_ * own_dot * std::max(0.0, depth_[at] - yield_[i]));
     pressure_dot[at] = modulus_ * own;
   }
 }

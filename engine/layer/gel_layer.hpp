@@ -51,8 +51,11 @@ class GelLayer {
   /// Computes the cotangent of the depths, (points), from that of the pressures. Which points press
   /// stays fixed. p is proportional to E.
   void pull_back(std::span<const double> pressure_bar, std::span<double> depth_bar);
-  /// Computes how the pressures change with the depths, (points), at a given E.
-  void push_forward(std::span<const double> depth_dot, std::span<double> pressure_dot);
+  /// Returns the cotangent of t and ν at these depths, after pull_back() of the same cotangent.
+  [[nodiscard]] LayerMaterial pull_back_material(std::span<const double> pressure_bar) const;
+  /// Computes how the pressures change with the depths, (points), and with t and ν, at a given E.
+  void push_forward(std::span<const double> depth_dot, const LayerMaterial& material_dot,
+                    std::span<double> pressure_dot);
   /// Sets the sums of pressing cells, (cells, kernels::kCellNumbers), to zero.
   void clear_cells(AlignedVector<double>& cells) const;
   /// Adds what the yield of a layer that is the contact changes in the slopes of a wrench, (6,
@@ -77,6 +80,7 @@ class GelLayer {
   void share_loads();
   [[nodiscard]] double relaxed(int cell);
   [[nodiscard]] double coupling(int i, int j) const;
+  void change_coupling(const LayerMaterial& by, std::vector<double>& out) const;
   [[nodiscard]] double between_cells(int point) const;
   [[nodiscard]] std::size_t cell(int point) const;
 

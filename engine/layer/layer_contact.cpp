@@ -166,13 +166,15 @@ double LayerContact::energy() const {
 }
 
 LayerContact::PointChange LayerContact::changed(const Point& p, const LayerBody<D>& body,
-                                                const Anchor<D>& anchor) const {
+                                                const Anchor<D>& anchor,
+                                                double thickness_dot) const {
   const LayerShape& of = bodies_[static_cast<std::size_t>(p.body)].shape;
   PointChange out{};
   kernels::with_distance<D>(
       of.shape, body.size,
       [&](const auto& shape) {
-        out.at = layer_depth(shape, body.touch, p.xi, *pad_->layer, p.known);
+        out.at = layer_depth(shape, body.touch, p.xi, *pad_->layer, p.known,
+                             D(pad_->layer->grid.thickness, thickness_dot));
         out.friction = layer_friction(shape, of, body.touch, dual(p.xi), D(double(p.known.by)),
                                       anchor, out.at.slant)
                            .ratio;
@@ -182,7 +184,8 @@ LayerContact::PointChange LayerContact::changed(const Point& p, const LayerBody<
 }
 
 Vec6<double> LayerContact::change_in_pad(std::span<const LayerBody<D>> bodies,
-                                         std::span<const Anchor<D>> anchors) {
+                                         std::span<const Anchor<D>> anchors,
+                                         const LayerMaterial& material_dot) {
   depth_dot_.resize(depth_.size());
   load_dot_.resize(depth_.size());
   changes_.clear();
@@ -191,10 +194,12 @@ Vec6<double> LayerContact::change_in_pad(std::span<const LayerBody<D>> bodies,
     changes_.emplace_back();
     if (!(p.load > 0)) return;
     changes_.back() = changed(p, bodies[static_cast<std::size_t>(p.body)],
-                              anchors.empty() ? dual(p.anchor) : anchors[changes_.size() - 1]);
+                              anchors.empty() ? dual(p.anchor) : anchors[changes_.size() - 1],
+                              material_dot.thickness);
     depth_dot = changes_.back().at.depth.epsilon;
   });
-  layers_[at_].push_forward(depth_dot_, load_dot_);
+  layers_[at_].push_forward(depth_dot_, material_dot, load_dot_);
+  const double softer = pad_->layer->own_change(material_dot) / pad_->layer->compliance.own;
   Vec6<double> sum = kernels::zero6<double>();
   std::size_t next = 0;
   for_each_point([&](const Point& p) {
@@ -205,7 +210,7 @@ Vec6<double> LayerContact::change_in_pad(std::span<const LayerBody<D>> bodies,
     const double relative = kn.epsilon / kn.value, P = p.load, F = p.friction_load,
                  P_dot = kn.value * pad_->layer->area * load_dot_[at] + relative * P,
                  slope = F > 0 ? point_stiffness(bodies_[body]) : 0,
-                 F_dot = F < P ? slope * depth_dot_[at] + relative * F : P_dot;
+                 F_dot = F < P ? slope * depth_dot_[at] + (relative - softer) * F : P_dot;
     const Vec3<double> f = P * p.at.slant + F * p.friction,
                        f_dot = P_dot * p.at.slant + P * change_of(change.at.slant) +
                                F_dot * p.friction + F * change_of(change.friction);
@@ -215,8 +220,9 @@ Vec6<double> LayerContact::change_in_pad(std::span<const LayerBody<D>> bodies,
 }
 
 Vec6<double> LayerContact::change(std::span<const LayerBody<D>> bodies,
-                                  std::span<const Anchor<D>> anchors) {
-  return wrench_to_parent(pad_->frame, change_in_pad(bodies, anchors));
+                                  std::span<const Anchor<D>> anchors,
+                                  const LayerMaterial& material_dot) {
+  return wrench_to_parent(pad_->frame, change_in_pad(bodies, anchors, material_dot));
 }
 
 void LayerContact::add_to(kernels::PairSums<double>& sums, bool derivatives) {

@@ -80,10 +80,11 @@ class LayerContact {
   /// Energy that the layer stores at depths without δ̇ [J].
   [[nodiscard]] double energy() const;
 
-  /// Returns the change of w where the bodies change as their dual numbers say. `anchors`: of the
-  /// points of for_each_point(), b in pad axes; empty: they stay.
+  /// Returns the change of w where the bodies change as their dual numbers say, and the material.
+  /// `anchors`: of the points of for_each_point(), b in pad axes; empty: they stay.
   kernels::Vec6<double> change(std::span<const kernels::LayerBody<D>> bodies,
-                               std::span<const kernels::Anchor<D>> anchors = {});
+                               std::span<const kernels::Anchor<D>> anchors = {},
+                               const LayerMaterial& material_dot = {});
   /// Adds w, and its derivatives by displacement and twist of the other link, to the sums.
   void add_to(kernels::PairSums<double>& sums, bool derivatives);
   /// Returns an anchor with b in pad axes instead of the axes of the pad's link.
@@ -117,9 +118,10 @@ class LayerContact {
   void keep_deepest(int k);
   void set_loads(const Body& body);
   [[nodiscard]] PointChange changed(const Point& p, const kernels::LayerBody<D>& body,
-                                    const kernels::Anchor<D>& anchor) const;
+                                    const kernels::Anchor<D>& anchor, double thickness_dot) const;
   [[nodiscard]] kernels::Vec6<double> change_in_pad(std::span<const kernels::LayerBody<D>> bodies,
-                                                    std::span<const kernels::Anchor<D>> anchors);
+                                                    std::span<const kernels::Anchor<D>> anchors,
+                                                    const LayerMaterial& material_dot);
 
   const kernels::KernelTable* table_ = nullptr;
   const LayerPad* pad_ = nullptr;

@@ -78,10 +78,14 @@ inline kernels::LayerLaw contact_law(const CompiledLayer& layer) {
   return {double(layer.outward), layer.bulge(), layer.relaxation, kFading * layer.grid.thickness};
 }
 
-/// Returns the factor of δ̇ at a depth δ [s].
+/// Returns the factor of δ̇ at a depth δ [s]; of a contact as fading_relaxation(), for a layer of
+/// this thickness.
 template <class N>
-N relaxation_at(const CompiledLayer& layer, const N& depth) {
-  return layer.feedback ? fading_relaxation(contact_law(layer), depth) : N(layer.relaxation);
+N relaxation_at(const CompiledLayer& layer, const N& depth, const N& thickness) {
+  if (!layer.feedback) return N(layer.relaxation);
+  const N share = depth * (N(1.0) / (N(kFading) * thickness));
+  using kernels::max, kernels::min;
+  return N(layer.relaxation) * min(max(share, N(0.0)), N(1.0));
 }
 
 /// Finds δ of a point; none where the point is outside the shape, or farther than the bulge. The
@@ -118,18 +122,19 @@ LayerDepth<N> underside_at(const Shape& shape, const kernels::Touch<N>& t,
   return out;
 }
 
-/// Returns depth and slant at a point whose δ is known. With dual numbers their derivatives follow
-/// from one more step of Newton's method. δ does not change with a shape that goes on below.
+/// Returns depth and slant at a point whose δ is known, on a layer of this thickness. With dual
+/// numbers their derivatives follow from one more step of Newton's method. Where a shape goes on
+/// below, δ is the thickness.
 template <class Shape, class N>
 LayerDepth<N> layer_depth(const Shape& shape, const kernels::Touch<N>& t,
                           const kernels::Vec3<double>& xi, const CompiledLayer& layer,
-                          const KnownDepth& known) {
+                          const KnownDepth& known, const N& thickness) {
   const N outward(layer.outward);
   const auto below = [&](const N& depth) {
     return kernels::Vec3<N>{N(xi.x), N(xi.y), N(xi.z) - outward * depth};
   };
   if (known.by == DepthBy::end) {
-    const N depth(known.depth);
+    const N depth = layer.table ? N(known.depth) : thickness;
     return {depth, {N(0.0), N(0.0), -outward}, below(depth)};
   }
   LayerDepth<N> out;
@@ -144,7 +149,8 @@ LayerDepth<N> layer_depth(const Shape& shape, const kernels::Touch<N>& t,
     out = underside_at(shape, t, xi, outward, known.depth);
     depth = out.depth;
   }
-  out.depth = depth + relaxation_at(layer, depth) * dot(out.slant, t.v + cross(t.omega, out.place));
+  out.depth = depth + relaxation_at(layer, depth, thickness) *
+                          dot(out.slant, t.v + cross(t.omega, out.place));
   return out;
 }
 

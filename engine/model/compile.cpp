@@ -396,7 +396,7 @@ class Compiler {
         if (m_.scene.pair_contacts[k].sensor == name)
           m_.pairs[k].layer_pad = static_cast<int>(m_.layer_pads.size()),
           m_.contact_info[k].law = "of the layer";
-      m_.layer_pads.push_back({sensor.layer, sensor.pad, sensor_points_[name]});
+      m_.layer_pads.push_back({sensor.number, sensor.layer, sensor.pad, sensor_points_[name]});
     }
     number_layers(m_);
     for (kernels::PairContact& pair : m_.pairs) pair.extent += bulge_of(m_, pair);

@@ -4,6 +4,8 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
+#include <mutex>
 #include <optional>
 #include <vector>
 
@@ -12,6 +14,28 @@
 #include "engine/model/surface_compliance.hpp"
 
 namespace tangere {
+
+/// Numbers of a layer's material.
+struct LayerMaterial {
+  double thickness = 0, poisson = 0;  ///< t [m], ν
+};
+
+/// Derivatives of a layer's compliance by its material. They are computed when they are first read,
+/// by one thread; copies share them.
+class SharedSlopes {
+ public:
+  [[nodiscard]] const LayerSlopes& at(const LayerGrid& grid) const {
+    std::call_once(state_->once, [&] { state_->slopes = compile_layer_slopes(grid); });
+    return state_->slopes;
+  }
+
+ private:
+  struct State {
+    std::once_flag once;
+    LayerSlopes slopes;
+  };
+  std::shared_ptr<State> state_ = std::make_shared<State>();
+};
 
 struct CompiledLayer {
   /// Pressure [Pa] by depth [m], of points that are not coupled; the numbers of cells are then not
@@ -27,6 +51,7 @@ struct CompiledLayer {
   std::vector<int> cell_of_point;    ///< (points) row-major
   std::vector<CellWeights> weights;  ///< (points) row-major
   LayerCompliance compliance;
+  SharedSlopes slopes;
   double modulus = 0;     ///< E [Pa], of a table 1, where kn is `stiffness`; proportional to kn
   double stiffness = 0;   ///< kn of the scene [N/m]
   double relaxation = 0;  ///< τ [s]
@@ -36,6 +61,12 @@ struct CompiledLayer {
   int outward = 1;        ///< 1 or -1: whether the pad's z points out of the skin
   /// Of a contact: how far above the surface a body may be that the gel's bulge touches [m].
   [[nodiscard]] double bulge() const { return feedback ? 0.1 * grid.thickness : 0; }
+  /// Returns how C(0) changes with the material [m], at E = 1 Pa.
+  [[nodiscard]] double own_change(const LayerMaterial& by) const {
+    if (by.thickness == 0 && by.poisson == 0) return 0;
+    const LayerSlopes& of = slopes.at(grid);
+    return by.thickness * of.thickness.own + by.poisson * of.poisson.own;
+  }
   std::array<int, 2> direction{1, 1};          ///< 1 or -1: whether rows count along axis0, cols
                                                ///< along axis1
   std::optional<SurfaceCompliance> surface{};  ///< of a sensor with markers or pictures

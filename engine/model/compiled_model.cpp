@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "engine/model/compiled_layer.hpp"
+
 namespace tangere {
 
 kernels::PadTiles CompiledSensor::tiles() const {
@@ -73,7 +75,10 @@ void point_view(CompiledModel& m) {
   rows.places = rows.solid(v.n_solids);
   rows.loops = rows.place(v.n_links);
   rows.sensors = rows.loop(static_cast<int>(m.loops.size()));
-  rows.count = rows.sensor(static_cast<int>(m.sensors.size()));
+  m.layer_rows = rows.sensor(static_cast<int>(m.sensors.size()));
+  const bool layers = std::ranges::any_of(
+      m.sensors, [](const CompiledSensor& s) { return s.layer && !s.layer->table; });
+  rows.count = layers ? m.layer_row(static_cast<int>(m.sensors.size())) : m.layer_rows;
   v.pattern = m.pattern.view();
   v.n_followers = static_cast<int>(m.followers.size());
   v.followers = m.followers.data();

@@ -136,6 +136,7 @@ struct DryDof {
 
 /// A sensor's pad whose layer is its contact.
 struct LayerPad {
+  int sensor;
   std::shared_ptr<const CompiledLayer> layer;
   kernels::Frame<double> frame;  ///< of the pad in its link, as in CompiledSensor
   std::vector<int> in_field;     ///< (points) number in the field of point k of its contacts
@@ -214,6 +215,9 @@ struct CompiledModel {
   std::vector<CompiledEndEffector> end_effectors;
   std::vector<CompiledCamera> cameras;
   std::vector<LayerPad> layer_pads;
+  int layer_rows = 0;  ///< layer_row(0)
+  /// Returns the row of derivatives of the thickness of a sensor's layer; ν has the next one.
+  [[nodiscard]] int layer_row(int sensor) const { return layer_rows + 2 * sensor; }
   int layer_link_pairs = 0;  ///< link pairs that they touch
   std::vector<kernels::PairContact> pairs;
   std::vector<kernels::GroundContact> grounds;

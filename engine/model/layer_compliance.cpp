@@ -9,12 +9,19 @@
 #include <numbers>
 #include <utility>
 
+#include "kernels/numbers/dual.hpp"
+
 namespace tangere {
+
+using D = kernels::Dual<double>;
+
 namespace {
 
 constexpr int kAliases = 3;         // on each side of a wave number
 constexpr int kPads = 3;            // of the periodic box, at least
 constexpr double kThicknesses = 6;  // of it
+constexpr double kLessCells =
+    1e-3;  // a thickness of whole cells may be rounded, or change a little
 
 double sinc(double x) { return x == 0 ? 1 : std::sin(x) / x; }
 
@@ -28,7 +35,8 @@ struct Axis {
   /// `n`: cells of the pad; `offsets`: how many of them are needed.
   Axis(int n, int offsets, double h, double thickness)
       : cells(2 * static_cast<int>(std::ceil(
-                      0.5 * (std::max(kPads * n, offsets + n) + kThicknesses * thickness / h)))),
+                      0.5 * (std::max(kPads * n, offsets + n) + kThicknesses * thickness / h) -
+                      kLessCells))),
         pitch(h) {
     for (int m = 0; m <= cells / 2; ++m)
       for (int a = -kAliases; a <= kAliases; ++a) {
@@ -48,76 +56,139 @@ struct Axis {
   }
 };
 
+double exp_of(double x) { return std::exp(x); }
+D exp_of(const D& x) {
+  const double e = std::exp(x.value);
+  return {e, e * x.epsilon};
+}
+double tanh_of(double x) { return std::tanh(x); }
+D tanh_of(const D& x) {
+  const double t = std::tanh(x.value);
+  return {t, (1 - t * t) * x.epsilon};
+}
+
+/// N, L, T, c of a thickness and a Poisson's ratio, which may be dual numbers.
+template <class N>
+struct Compliances {
+  N normal, along, across, coupling;
+};
+template <class N>
+Compliances<N> compliances(const N& t, const N& nu, double wave_number) {
+  const N one(1.0), G = one / (N(2.0) * (one + nu)), kappa = N(3.0) - N(4.0) * nu;
+  if (wave_number == 0)
+    return {t * (one - N(2.0) * nu) / (N(2.0) * G * (one - nu)), t / G, t / G, N(0.0)};
+  // Numerators and D times e^{-2ξ}, which does not overflow.
+  const N xi = N(wave_number) * t, e2 = exp_of(N(-2.0) * xi), e4 = e2 * e2;
+  const N d = kappa * (one + e4) + (N(4.0) * xi * xi + one + kappa * kappa) * e2;
+  const N sides = kappa * (one - e4), bend = N(4.0) * xi * e2, scale = one / (G * N(wave_number));
+  const N c = N(2.0) * xi * xi * e2 - kappa * (one - N(2.0) * nu) * (N(0.5) * (one + e4) - e2);
+  return {(one - nu) * scale * (sides - bend) / d, (one - nu) * scale * (sides + bend) / d,
+          scale * tanh_of(xi), scale * c / d};
+}
+
 /// Ĉ_ab at a wave vector, without the factor i of coupled components.
-double component(const WaveCompliance& c, int a, int b, double k0, double k1) {
+template <class N>
+N component(const Compliances<N>& c, int a, int b, double k0, double k1) {
   if (a == 2 && b == 2) return c.normal;
   const double size = std::hypot(k0, k1);
-  if (size == 0) return a == b ? c.along : 0;
+  if (size == 0) return a == b ? c.along : N(0.0);
   const double e[2] = {k0 / size, k1 / size};
-  if (b == 2) return e[a] * c.coupling;
-  if (a == 2) return -e[b] * c.coupling;
-  return e[a] * e[b] * (c.along - c.across) + (a == b ? c.across : 0);
+  if (b == 2) return N(e[a]) * c.coupling;
+  if (a == 2) return N(-e[b]) * c.coupling;
+  return N(e[a] * e[b]) * (c.along - c.across) + (a == b ? c.across : N(0.0));
 }
 
 /// Σ over aliases of Ĉ_ab S² for each pair of wave numbers, (axis 0, axis 1).
-std::vector<double> spectrum(const LayerGrid& grid, int a, int b, const Axis& y, const Axis& x) {
+template <class N>
+std::vector<N> spectrum(const N& t, const N& nu, int a, int b, const Axis& y, const Axis& x) {
   constexpr int kEach = 2 * kAliases + 1;
-  std::vector<double> sums;
+  std::vector<N> sums;
   for (int m = 0; m <= y.cells / 2; ++m)
     for (int n = 0; n <= x.cells / 2; ++n) {
-      double sum = 0;
+      N sum(0.0);
       for (std::size_t s = 0; s < kEach; ++s)
-        for (std::size_t t = 0; t < kEach; ++t) {
-          const std::size_t i = std::size_t(m) * kEach + s, j = std::size_t(n) * kEach + t;
-          const WaveCompliance at =
-              layer_compliance(grid.thickness, grid.poisson, std::hypot(y.waves[i], x.waves[j]));
-          sum += y.share[i] * x.share[j] * component(at, a, b, y.waves[i], x.waves[j]);
+        for (std::size_t r = 0; r < kEach; ++r) {
+          const std::size_t i = std::size_t(m) * kEach + s, j = std::size_t(n) * kEach + r;
+          const Compliances<N> at = compliances(t, nu, std::hypot(y.waves[i], x.waves[j]));
+          sum += N(y.share[i] * x.share[j]) * component(at, a, b, y.waves[i], x.waves[j]);
         }
       sums.push_back(sum);
     }
   return sums;
 }
 
-}  // namespace
-
-WaveCompliance layer_compliance(double thickness, double poisson, double wave_number) {
-  const double G = 1 / (2 * (1 + poisson)), kappa = 3 - 4 * poisson;
-  if (wave_number == 0)
-    return {thickness * (1 - 2 * poisson) / (2 * G * (1 - poisson)), thickness / G, thickness / G,
-            0};
-  // Numerators and D times e^{-2ξ}, which does not overflow.
-  const double xi = wave_number * thickness, e2 = std::exp(-2 * xi), e4 = e2 * e2;
-  const double D = kappa * (1 + e4) + (4 * xi * xi + 1 + kappa * kappa) * e2;
-  const double sides = kappa * (1 - e4), bend = 4 * xi * e2, scale = 1 / (G * wave_number);
-  const double c = 2 * xi * xi * e2 - kappa * (1 - 2 * poisson) * (0.5 * (1 + e4) - e2);
-  return {(1 - poisson) * scale * (sides - bend) / D, (1 - poisson) * scale * (sides + bend) / D,
-          scale * std::tanh(xi), scale * c / D};
-}
-
-// An axis along which C_ab is odd has sines. Two odd axes give i² = -1, and so do one odd axis and
-// the factor i of a coupled component.
-std::vector<double> offset_table(const LayerGrid& grid, int a, int b, int rows, int cols) {
+/// C_ab at the offsets of 0 … rows - 1 by 0 … cols - 1 cells, row-major. An axis along which C_ab
+/// is odd has sines. Two odd axes give i² = -1, and so do one odd axis and the factor i of a
+/// coupled component.
+template <class N>
+std::vector<N> offsets_of(const LayerGrid& grid, const N& t, const N& nu, int a, int b, int rows,
+                          int cols) {
   const bool odd0 = (a == 0) != (b == 0), odd1 = (a == 1) != (b == 1);
   const double sign = odd0 || odd1 ? -1 : 1;
   const Axis y(grid.rows, rows, grid.height, grid.thickness),
       x(grid.cols, cols, grid.width, grid.thickness);
-  const std::vector<double> sums = spectrum(grid, a, b, y, x);
+  const std::vector<N> sums = spectrum(t, nu, a, b, y, x);
   const int ny = y.cells / 2 + 1, nx = x.cells / 2 + 1;
-  std::vector<double> half(std::size_t(ny) * std::size_t(cols)),
-      out(std::size_t(rows) * std::size_t(cols));
+  std::vector<N> half(std::size_t(ny) * std::size_t(cols), N(0.0)),
+      out(std::size_t(rows) * std::size_t(cols), N(0.0));
   for (int c = 0; c < cols; ++c)
     for (int n = 0; n < nx; ++n) {
-      const double wave = x.wave(n, c, odd1);
+      const N wave(x.wave(n, c, odd1));
       for (int m = 0; m < ny; ++m)
         half[std::size_t(m * cols + c)] += wave * sums[std::size_t(m * nx + n)];
     }
   for (int r = 0; r < rows; ++r)
     for (int m = 0; m < ny; ++m) {
-      const double wave = sign * y.wave(m, r, odd0) / (double(y.cells) * x.cells);
+      const N wave(sign * y.wave(m, r, odd0) / (double(y.cells) * x.cells));
       for (int c = 0; c < cols; ++c)
         out[std::size_t(r * cols + c)] += wave * half[std::size_t(m * cols + c)];
     }
   return out;
+}
+
+/// Puts the numbers of offsets together for all pairs of cells.
+LayerCompliance from_offsets(const LayerGrid& grid, const std::vector<double>& table, int cols) {
+  const auto [below, beside] = doubled_margins(grid);
+  LayerCompliance out{table[0],
+                      std::vector<double>(std::size_t(grid.cells()) * std::size_t(grid.cells()))};
+  for (int i = 0; i < grid.cells(); ++i)
+    for (int j = 0; j <= i; ++j) {
+      double sum = 0;
+      for (const CellImage& r : cell_images(i / grid.cols, j / grid.cols, grid.rows, below))
+        for (const CellImage& c : cell_images(i % grid.cols, j % grid.cols, grid.cols, beside)) {
+          const double at = table[std::size_t(std::abs(r.offset) * cols + std::abs(c.offset))];
+          sum += r.mirrored == c.mirrored ? at : -at;
+        }
+      out.table[std::size_t(i) * std::size_t(grid.cells()) + std::size_t(j)] =
+          out.table[std::size_t(j) * std::size_t(grid.cells()) + std::size_t(i)] = sum;
+    }
+  return out;
+}
+
+/// Offsets that the cells of a grid and their images have, along the rows and along the columns.
+std::array<int, 2> offset_counts(const LayerGrid& grid) {
+  const auto [below, beside] = doubled_margins(grid);
+  return {below ? 2 * grid.rows + *below : grid.rows, beside ? 2 * grid.cols + *beside : grid.cols};
+}
+
+/// C(0) … by the direction of a thickness and a Poisson's ratio.
+LayerCompliance slope_along(const LayerGrid& grid, const D& thickness, const D& poisson) {
+  const auto [rows, cols] = offset_counts(grid);
+  std::vector<double> changes;
+  for (const D& x : offsets_of(grid, thickness, poisson, 2, 2, rows, cols))
+    changes.push_back(x.epsilon);
+  return from_offsets(grid, changes, cols);
+}
+
+}  // namespace
+
+WaveCompliance layer_compliance(double thickness, double poisson, double wave_number) {
+  const Compliances<double> c = compliances(thickness, poisson, wave_number);
+  return {c.normal, c.along, c.across, c.coupling};
+}
+
+std::vector<double> offset_table(const LayerGrid& grid, int a, int b, int rows, int cols) {
+  return offsets_of(grid, grid.thickness, grid.poisson, a, b, rows, cols);
 }
 
 CellImages cell_images(int i, int j, int n, std::optional<int> doubled) {
@@ -157,24 +228,13 @@ std::vector<CellWeights> cell_weights(const LayerGrid& grid, int side, int rows,
 }
 
 LayerCompliance compile_layer(const LayerGrid& grid) {
-  const auto [below, beside] = doubled_margins(grid);
-  const int rows = below ? 2 * grid.rows + *below : grid.rows,
-            cols = beside ? 2 * grid.cols + *beside : grid.cols;
-  const std::vector<double> table = offset_table(grid, 2, 2, rows, cols);
-  LayerCompliance out{table[0],
-                      std::vector<double>(std::size_t(grid.cells()) * std::size_t(grid.cells()))};
-  for (int i = 0; i < grid.cells(); ++i)
-    for (int j = 0; j <= i; ++j) {
-      double sum = 0;
-      for (const CellImage& r : cell_images(i / grid.cols, j / grid.cols, grid.rows, below))
-        for (const CellImage& c : cell_images(i % grid.cols, j % grid.cols, grid.cols, beside)) {
-          const double at = table[std::size_t(std::abs(r.offset) * cols + std::abs(c.offset))];
-          sum += r.mirrored == c.mirrored ? at : -at;
-        }
-      out.table[std::size_t(i) * std::size_t(grid.cells()) + std::size_t(j)] =
-          out.table[std::size_t(j) * std::size_t(grid.cells()) + std::size_t(i)] = sum;
-    }
-  return out;
+  const auto [rows, cols] = offset_counts(grid);
+  return from_offsets(grid, offset_table(grid, 2, 2, rows, cols), cols);
+}
+
+LayerSlopes compile_layer_slopes(const LayerGrid& grid) {
+  return {slope_along(grid, {grid.thickness, 1}, {grid.poisson, 0}),
+          slope_along(grid, {grid.thickness, 0}, {grid.poisson, 1})};
 }
 
 }  // namespace tangere

@@ -78,6 +78,12 @@ struct LayerCompliance {
 };
 LayerCompliance compile_layer(const LayerGrid& grid);
 
+/// Derivatives of compile_layer() where the cells and the sides stay: [1] and [m].
+struct LayerSlopes {
+  LayerCompliance thickness, poisson;
+};
+LayerSlopes compile_layer_slopes(const LayerGrid& grid);
+
 /// Four cells around a point and their bilinear weights, which may be 0.
 struct CellWeights {
   std::array<int, 4> cell{};

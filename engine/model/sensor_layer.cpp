@@ -128,10 +128,8 @@ std::shared_ptr<const CompiledLayer> compile_sensor_layer(const TactileDescripti
   layer->number = ++compiled_layers;
   layer->modulus = d.material->modulus;
   layer->feedback = d.layer->feedback;
-  // A contact has its kn from the material.
-  layer->stiffness = d.coefficients.kn > 0 && !layer->feedback
-                         ? d.coefficients.kn
-                         : skin_springs(*d.material).kn * height * width;
+  layer->stiffness =
+      d.coefficients.kn > 0 ? d.coefficients.kn : skin_springs(*d.material).kn * height * width;
   layer->relaxation = d.material->relaxation;
   layer->area = height * width;
   layer->deepest = t;

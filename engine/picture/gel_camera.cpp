@@ -75,6 +75,7 @@ GelCamera<T>::GelCamera(const PictureGrid& grid, const PictureDescription& pictu
       membrane_(grid.rows, grid.cols, picture.gel->reach.value_or(reach) / grid.pitch_x,
                 picture.gel->reach.value_or(reach) / grid.pitch_y),
       image_(grid, picture.gel->blur, outside),
+      height_(grid, 0, outside),
       colour_(*picture.gel, grid.height, grid.width),
       depth_(static_cast<std::size_t>(grid.points())),
       surface_(depth_.size()),
@@ -111,14 +112,15 @@ void GelCamera<T>::set_draws(const CameraKey& key) {
 }
 
 template <class T>
-void GelCamera<T>::read_height(std::span<T> height) const {
+void GelCamera<T>::read_height(std::span<T> height) {
   const std::size_t width = p_.size();
+  height_.set(surface_);
   for (int row = 0; row < grid_.height; ++row)
-    image_.read_heights(row, height.subspan(static_cast<std::size_t>(row) * width, width));
+    height_.read_heights(row, height.subspan(static_cast<std::size_t>(row) * width, width));
 }
 
 template <class T>
-void GelCamera<T>::paint(int row, bool markers, std::span<T> up) {
+void GelCamera<T>::shade(int row, std::span<T> up) {
   if (image_.is_flat(row)) {
     std::fill(p_.begin(), p_.end(), T(0));
     std::fill(q_.begin(), q_.end(), T(0));
@@ -129,12 +131,22 @@ void GelCamera<T>::paint(int row, bool markers, std::span<T> up) {
     image_.read_slopes(row, p_, q_);
     colour_.shade(row, p_, q_, planes_, up);
   }
-  if (markers) markers_->darken(row, planes_);
+}
+
+template <class T>
+void GelCamera<T>::add_draws(int row) {
   if (!key_) return;
   const std::size_t width = p_.size();
   for (std::size_t c = 0; c < kColours && gain_ != 0; ++c)
     for (std::size_t i = 0; i < width; ++i) planes_[c * width + i] *= gains_[c];
   if (noise_ != 0) add_camera_noise<T>(*key_, noise_, row * grid_.width, planes_);
+}
+
+template <class T>
+void GelCamera<T>::paint(int row, bool markers, std::span<T> up) {
+  shade(row, up);
+  if (markers) markers_->darken(row, planes_);
+  add_draws(row);
 }
 
 template <class T>
@@ -162,24 +174,53 @@ void GelCamera<T>::read(bool markers,
 
 template <class T>
 void GelCamera<T>::pull_back(bool markers, std::span<const T> height_bar,
-                             std::span<const T> colour_bar, std::span<T> surface_bar) {
+                             std::span<const T> colour_bar, std::span<T> surface_bar,
+                             std::span<T> displacement_bar) {
+  if (colour_bar.empty()) {
+    std::fill(surface_bar.begin(), surface_bar.end(), T(0));
+  } else {
+    pull_back_colours(markers, colour_bar, !displacement_bar.empty());
+    image_.take(surface_bar);
+    if (!displacement_bar.empty()) markers_->take(displacement_bar);
+  }
+  if (height_bar.empty()) return;
   const std::size_t width = p_.size();
-  std::vector<T> planes_bar(planes_.size()), up(width);
+  height_.begin_pull_back();
+  for (int row = 0; row < grid_.height; ++row)
+    height_.add_heights(row, height_bar.subspan(static_cast<std::size_t>(row) * width, width));
+  std::vector<T> heights_bar(surface_bar.size());
+  height_.take(heights_bar);
+  for (std::size_t k = 0; k < heights_bar.size(); ++k) surface_bar[k] += heights_bar[k];
+}
+
+/// Leaves the cotangents of colours in image_ and, where they `move`, in markers_.
+template <class T>
+void GelCamera<T>::pull_back_colours(bool markers, std::span<const T> colour_bar, bool move) {
+  const std::size_t width = p_.size();
+  std::vector<T> planes_bar(planes_.size()), up(width), shaded, levels_bar(width);
   image_.begin_pull_back();
+  if (move) markers_->begin_pull_back();
   for (int row = 0; row < grid_.height; ++row) {
-    const auto first = static_cast<std::size_t>(row) * width;
-    if (!height_bar.empty()) image_.add_heights(row, height_bar.subspan(first, width));
-    if (colour_bar.empty()) continue;
-    paint(row, markers, up);
+    shade(row, up);
+    if (move) shaded = planes_;
+    if (markers) markers_->darken(row, planes_);
+    add_draws(row);
     // Factors of the markers, by painting a row of ones.
     std::fill(planes_bar.begin(), planes_bar.end(), T(1));
     if (markers) markers_->darken(row, planes_bar);
-    weigh_row(
-        {planes_.data(), colour_bar.data() + kColours * first, planes_bar.data(), width, gains_});
+    weigh_row({planes_.data(), colour_bar.data() + kColours * static_cast<std::size_t>(row) * width,
+               planes_bar.data(), width, gains_});
+    if (move) {
+      for (std::size_t i = 0; i < width; ++i) {
+        levels_bar[i] = 0;
+        for (std::size_t c = 0; c < kColours; ++c)
+          levels_bar[i] += shaded[c * width + i] * planes_bar[c * width + i];
+      }
+      markers_->add_row(row, levels_bar);
+    }
     colour_.pull_back(row, p_, q_, up, planes_bar, p_bar_, q_bar_);
     image_.add_slopes(row, p_bar_, q_bar_);
   }
-  image_.take(surface_bar);
 }
 
 template <class T>

@@ -38,29 +38,34 @@ class GelCamera {
   /// Chooses the draws of the pictures that follow; without them there is no noise.
   void set_draws(const CameraKey& key);
 
-  /// Computes the surface, (height, width) [m].
-  void read_height(std::span<T> height) const;
+  /// Computes the surface, (height, width) [m], without the gel's blur.
+  void read_height(std::span<T> height);
   /// Computes colours, (height, width, 3), from 0 to 255. `markers`: with printed markers.
   void read(bool markers, std::span<T> colours);
   /// The same, rounded to whole levels; 0 for what is not a number.
   void read(bool markers, std::span<std::uint8_t> colours) requires std::is_same_v<T, float>;
 
   /// Computes the cotangent of the surface from those of the height, (height, width), and of the
-  /// colours, (height, width, 3); one of them may be empty. Clamped numbers have no derivative, and
-  /// none goes by the motion of markers.
+  /// colours, (height, width, 3); one of them may be empty. With markers also that of their
+  /// displacements, (points, 2); empty: it is not computed. Clamped numbers have no derivative.
   void pull_back(bool markers, std::span<const T> height_bar, std::span<const T> colour_bar,
-                 std::span<T> surface_bar);
+                 std::span<T> surface_bar, std::span<T> displacement_bar = {});
   /// The same for the depth that was given last.
   void pull_back_depth(std::span<const T> surface_bar, std::span<T> depth_bar);
 
  private:
   /// Fills planes_ with a row of the picture, not clamped yet. `up`: as of GelColour::shade().
   void paint(int row, bool markers, std::span<T> up = {});
+  /// Fills planes_ with the colours of a row of the gel.
+  void shade(int row, std::span<T> up);
+  /// Multiplies planes_ by the gains and adds noise.
+  void add_draws(int row);
+  void pull_back_colours(bool markers, std::span<const T> colour_bar, bool move);
 
   PictureGrid grid_;
   double noise_, gain_;
   Membrane<T> membrane_;
-  SurfaceImage<T> image_;
+  SurfaceImage<T> image_, height_;  // as light and as heights have the surface
   GelColour<T> colour_;
   std::optional<PrintedMarkers<T>> markers_;
   std::optional<CameraKey> key_;

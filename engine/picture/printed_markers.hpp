@@ -30,10 +30,23 @@ class PrintedMarkers {
   /// Multiplies the colours of a row, (3, width).
   void darken(int row, std::span<T> planes) const;
 
+  /// Sets the cotangents of the discs' places to zero.
+  void begin_pull_back();
+  /// Adds those of a row. `levels_bar`: (width) Σ over colours of a level, darkened by all discs,
+  /// times its cotangent.
+  void add_row(int row, std::span<const T> levels_bar);
+  /// Computes the cotangent of the displacements, (points, 2).
+  void take(std::span<T> displacement_bar) const;
+
  private:
+  /// Calls f(pixel of the row, its distance along x and along y from the disc's centre) for those
+  /// that a disc may darken [pixels]. y is in units in which a disc is round.
+  template <class F>
+  void for_pixels(const Disc& disc, int row, const F& f) const;
+
   PictureGrid grid_;
   double radius_x_, radius_y_;  // [pixels]
-  std::vector<Disc> rest_, moved_;
+  std::vector<Disc> rest_, moved_, bar_;
   std::vector<SplineWeights<double>> columns_, lines_;  // of each disc
 };
 

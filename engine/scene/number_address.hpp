@@ -33,7 +33,9 @@ enum class NumberField {
   scale,
   pos,
   q,
-  v
+  v,
+  thickness,
+  poisson
 };
 /// Names a number of a scene. A number of a joint applies to all of its dofs.
 struct SceneNumber {

@@ -95,6 +95,13 @@ const double* loop_number(const Scene& scene, const SceneNumber& n) {
   return &((*at).*kLoopNumbers[loop_index(n.field)]);
 }
 
+/// A number of the material of a coupled layer.
+const double* layer_number(const Scene& scene, const SceneNumber& n) {
+  const auto at = std::ranges::find(scene.sensors, n.name, &TactileDescription::name);
+  if (at == scene.sensors.end() || !at->layer || !at->material) return nullptr;
+  return n.field == Field::thickness ? &at->material->thickness : &at->layer->poisson;
+}
+
 /// Returns nullptr where the scene has no such number.
 const double* find_number(const Scene& scene, const SceneNumber& n) {
   number_kind(n.owner, n.field);  // throws if there is no such kind
@@ -107,6 +114,7 @@ const double* find_number(const Scene& scene, const SceneNumber& n) {
     return found;
   }
   if (n.owner == Owner::loop) return loop_number(scene, n);
+  if (n.field == Field::thickness || n.field == Field::poisson) return layer_number(scene, n);
   if (n.owner == Owner::body || n.owner == Owner::joint) {
     const LinkDescription* const link = link_of(scene, n);
     if (link == nullptr) return nullptr;
@@ -132,8 +140,9 @@ const double& found_number(const Scene& scene, const SceneNumber& number) {
 }  // namespace
 
 std::uint64_t element_of(NumberOwner owner) {
-  constexpr std::uint64_t kElementOf[] = {kPairContact,           kGroundContact, kTactile, kBody,
-                                          kJoint | kInitialJoint, kMotor,         kLoops};
+  constexpr std::uint64_t kElementOf[] = {kPairContact, kGroundContact,         kTactile | kLayer,
+                                          kBody,        kJoint | kInitialJoint, kMotor,
+                                          kLoops};
   return kElementOf[static_cast<int>(owner)];
 }
 

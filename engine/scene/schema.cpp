@@ -24,7 +24,7 @@ using L = LoopDescription;
 
 constexpr const char *kNone = "", *kNeeded = nullptr;
 constexpr const char* kMoving = "revolute prismatic planar translational free2d spherical free";
-constexpr const char* kSingle = "revolute prismatic";
+constexpr const char *kSingle = "revolute prismatic", *kSkins = "rect_array hemisphere cylinder";
 constexpr const char* kDry = "revolute prismatic planar translational free2d";
 constexpr int kParameter = kVaries | kGradient;
 constexpr int kMostPoints = 1 << 20;  // of a surface, and of a sensor
@@ -284,14 +284,14 @@ constexpr Attribute kSchema[] = {
         Words{"clamped paper linear published"}, Flags{kInDefault}),
     row(kPairContact, "law", "clamped", U::one, "see contact.md",
         Words{"clamped paper linear published"}, Flags{kInDefault}),
-    row(kTactile, "per", "point", U::one, "all but mu count per area",
-        Types{"rect_array hemisphere cylinder"}, Words{"point area"}, Flags{kInDefault}),
-    row(kTactile, "modulus", kNone, U::Pa, "gives kn, kt, ks, damping, see skin.md",
-        Types{"rect_array hemisphere cylinder"}, &SkinMaterial::modulus, B::positive),
-    row(kTactile, "thickness", kNone, U::m, "with modulus or pressure",
-        Types{"rect_array hemisphere cylinder"}, &SkinMaterial::thickness, B::positive),
-    row(kTactile, "relaxation", "0.005", U::s, "with modulus or pressure",
-        Types{"rect_array hemisphere cylinder"}, &SkinMaterial::relaxation, B::not_negative),
+    row(kTactile, "per", "point", U::one, "all but mu count per area", Types{kSkins},
+        Words{"point area"}, Flags{kInDefault}),
+    row(kTactile, "modulus", kNone, U::Pa, "gives kn, kt, ks, damping, see skin.md", Types{kSkins},
+        &SkinMaterial::modulus, B::positive),
+    row(kTactile, "thickness", kNone, U::m, "with modulus or pressure", F::thickness, Types{kSkins},
+        &SkinMaterial::thickness, B::positive, Flags{kGradient}),
+    row(kTactile, "relaxation", "0.005", U::s, "with modulus or pressure", Types{kSkins},
+        &SkinMaterial::relaxation, B::not_negative),
     row(kTactile, "pressure_depth", kNone, U::m, "depths of a table of pressures, from 0",
         Types{"rect_array"}, B::not_negative),
     row(kTactile, "pressure", kNone, U::Pa, "at these depths, from 0, see table.md",
@@ -357,8 +357,8 @@ constexpr Attribute kSchema[] = {
         B::positive),
     row(kMarkers, "spread", kNone, U::m, "distance over which the surface moves along",
         &MarkersDescription::spread, B::positive),
-    row(kLayer, "poisson", "0.475", U::one, "Poisson's ratio, below 0.5",
-        &LayerDescription::poisson, Between{B::range, 0, 0.4999}),
+    row(kLayer, "poisson", "0.475", U::one, "Poisson's ratio, below 0.5", F::poisson,
+        &LayerDescription::poisson, Between{B::range, 0, 0.4999}, Flags{kGradient}),
     row(kLayer, "cell", kNone, U::m, "side of a cell; a fifth of the thickness if left out",
         &LayerDescription::cell, B::positive),
     row(kLayer, "margin", kNone, U::m,

@@ -89,7 +89,8 @@ void LayeredField::add_point(int index, int group, const Vec3<double>& xi, doubl
         [&](const auto& shape) {
           const auto known = find_depth(shape, touches_[k], xi, layer);
           if (!known) return;
-          const LayerDepth<double> at = layer_depth(shape, touches_[k], xi, layer, *known);
+          const LayerDepth<double> at =
+              layer_depth(shape, touches_[k], xi, layer, *known, layer.grid.thickness);
           const bool presses = at.depth > -layer.bulge() && std::isfinite(at.depth) &&
                                dot(at.slant, at.slant) < kMostSlant * kMostSlant;
           if (presses && (best.target < 0 || at.depth > best.at.depth))
@@ -195,19 +196,23 @@ void LayeredField::read(const CompiledSensor& sensor, const kernels::TactileArgs
     if (!solved || !std::isfinite(whole_[k])) field[k] = std::numeric_limits<double>::quiet_NaN();
 }
 
-/// Returns depth and slant where a shape moves as its dual numbers say.
-LayerDepth<D> LayeredField::moved(const Point& p, const Touch<D>& touch,
-                                  const Vec3<D>& size) const {
+/// Returns depth and slant where a shape moves as its dual numbers say, and the thickness changes.
+LayerDepth<D> LayeredField::moved(const Point& p, const Touch<D>& touch, const Vec3<D>& size,
+                                  double thickness_dot) const {
   const CompiledLayer& layer = *sensor_->layer;
   const kernels::TouchShape& s = shapes_[static_cast<std::size_t>(p.target)];
   LayerDepth<D> out;
   kernels::with_distance<D>(
       s.shape, size,
-      [&](const auto& shape) { out = layer_depth(shape, touch, p.xi, layer, p.known); }, s.grid);
+      [&](const auto& shape) {
+        out =
+            layer_depth(shape, touch, p.xi, layer, p.known, D(layer.grid.thickness, thickness_dot));
+      },
+      s.grid);
   return out;
 }
 
-void LayeredField::pull_back(std::span<const double> field_bar, bool sizes, Cotangents& out) {
+void LayeredField::pull_back(std::span<const double> field_bar, bool numbers, Cotangents& out) {
   const CompiledLayer& layer = *sensor_->layer;
   for (std::span<double> x : {out.whole, out.normal}) std::fill(x.begin(), x.end(), 0.0);
   out.stiffness = 0;
@@ -251,7 +256,35 @@ void LayeredField::pull_back(std::span<const double> field_bar, bool sizes, Cota
   for (std::size_t i = 0; i < points_.size(); ++i) depth_bar_[place(points_[i])] += held_bar_[i];
   for (kernels::TouchCotangent<double>& t : out.touches) t = {};
   for (std::size_t i = 0; i < points_.size(); ++i)
-    if (points_[i].known.by != DepthBy::end) pull_back_point(points_[i], slant_bar_[i], sizes, out);
+    if (points_[i].known.by != DepthBy::end)
+      pull_back_point(points_[i], slant_bar_[i], numbers, out);
+  out.material = {};
+  if (numbers && !layer.table) pull_back_material(out);
+}
+
+/// Adds the cotangents of the layer's material, from the pressures and from depths that follow from
+/// the thickness.
+void LayeredField::pull_back_material(Cotangents& out) const {
+  const auto count = static_cast<std::size_t>(sensor_->points());
+  for (std::size_t g = 0; g < layers_.size(); ++g) {
+    const LayerMaterial of =
+        layers_[g].pull_back_material(std::span(load_bar_).subspan(g * count, count));
+    out.material.thickness += of.thickness;
+    out.material.poisson += of.poisson;
+  }
+  const LayerSlopes& slopes = sensor_->layer->slopes.at(sensor_->layer->grid);
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    const Point& p = points_[i];
+    const auto target = static_cast<std::size_t>(p.target);
+    const double* const size = shapes_[target].size;
+    out.material.thickness += along(moved(p, displaced(touches_[target], {0, 0, 0}, {0, 0, 0}),
+                                          lifted({size[0], size[1], size[2]}, {0, 0, 0}), 1),
+                                    depth_bar_[place(p)], slant_bar_[i]);
+    // Friction whose load is a k δ has the k of the material.
+    const double own_bar = -held_bar_[i] * p.at.depth / sensor_->layer->compliance.own;
+    out.material.thickness += own_bar * slopes.thickness.own;
+    out.material.poisson += own_bar * slopes.poisson.own;
+  }
 }
 
 /// Adds the cotangents of the motion and of the size of the shape at a point.
@@ -264,8 +297,8 @@ void LayeredField::pull_back_point(const Point& p, const Vec3<double>& slant_bar
   const Vec3<double> size = {own[0], own[1], own[2]}, none = {0, 0, 0};
   const auto change = [&](const Vec3<double>& turn, const Vec3<double>& shift,
                           const Vec3<double>& grow) {
-    return along(moved(p, displaced(touches_[target], turn, shift), lifted(size, grow)), depth_bar,
-                 slant_bar);
+    return along(moved(p, displaced(touches_[target], turn, shift), lifted(size, grow), 0),
+                 depth_bar, slant_bar);
   };
   const auto along_axes = [](const auto& f) {
     return Vec3<double>{f(unit(0)), f(unit(1)), f(unit(2))};
@@ -275,26 +308,33 @@ void LayeredField::pull_back_point(const Point& p, const Vec3<double>& slant_bar
       along_axes([&](const Vec3<double>& e) { return change(none, e, none); })};
   if (sizes) to.size += along_axes([&](const Vec3<double>& e) { return change(none, none, e); });
   const Vec3<double> rate =
-      (depth_bar * relaxation_at(*sensor_->layer, p.known.depth)) * p.at.slant;
+      (depth_bar * relaxation_at(*sensor_->layer, p.known.depth, sensor_->layer->grid.thickness)) *
+      p.at.slant;
   to.twist += kernels::Vec6<double>{cross(p.at.place, rate), rate};
 }
 
 void LayeredField::push_forward(const SpringFields& springs_dot, std::span<const Touch<D>> touches,
                                 std::span<const Vec3<D>> sizes, double stiffness_dot,
-                                std::span<double> field_dot) {
+                                const LayerMaterial& material_dot, std::span<double> field_dot) {
   const CompiledLayer& layer = *sensor_->layer;
   std::vector<Vec3<double>> slants_dot;
   std::vector<double> depth_dot(depth_.size()), pressure_dot(depth_.size());
   for (const Point& p : points_) {
     const auto target = static_cast<std::size_t>(p.target);
-    const LayerDepth<D> at = moved(p, touches[target], sizes[target]);
+    const LayerDepth<D> at = moved(p, touches[target], sizes[target], material_dot.thickness);
     depth_dot[place(p)] = at.depth.epsilon;
     slants_dot.push_back({at.slant.x.epsilon, at.slant.y.epsilon, at.slant.z.epsilon});
   }
+  double own_dot = 0;
   for_each_law([&](auto& law, std::size_t first, std::size_t count) {
-    law.push_forward(std::span(depth_dot).subspan(first, count),
-                     std::span(pressure_dot).subspan(first, count));
+    const auto dot = std::span(depth_dot).subspan(first, count),
+               to = std::span(pressure_dot).subspan(first, count);
+    if constexpr (requires { law.push_forward(dot, to); })
+      law.push_forward(dot, to);
+    else
+      law.push_forward(dot, material_dot, to);
   });
+  if (layer.feedback) own_dot = layer.own_change(material_dot);
   std::fill(field_dot.begin(), field_dot.end(), 0.0);
   for (std::size_t i = 0; i < points_.size(); ++i) {
     const Point& p = points_[i];
@@ -315,8 +355,11 @@ void LayeredField::push_forward(const SpringFields& springs_dot, std::span<const
           springs - dot(now.normal, now.springs) * m_dot -
           (dot(m_dot, now.springs) + dot(now.normal, springs)) * now.normal;
       const double held = friction_load(p), slope = held > 0 ? point_stiffness() : 0,
-                   held_dot = held < load ? slope * depth_dot[place(p)] + held * stiffness_dot / kn_
-                                          : load_dot,
+                   held_dot =
+                       held < load
+                           ? slope * depth_dot[place(p)] +
+                                 held * (stiffness_dot / kn_ - own_dot / layer.compliance.own)
+                           : load_dot,
                    inverse = 1 / p.normal,
                    inverse_dot = -dot(n, n_dot) * inverse * inverse * inverse;
       f += (held_dot * inverse + held * inverse_dot) * now.along + (held * inverse) * along_dot;

@@ -37,17 +37,20 @@ class LayeredField {
     std::span<double> whole, normal;                       ///< (points, 3) of the springs' fields
     std::span<kernels::TouchCotangent<double>> touches{};  ///< pad axes and origin
     double stiffness = 0;                                  ///< of the coefficient kn
+    LayerMaterial material{};                              ///< of a layer
   };
-  /// Pulls the cotangent of the field back. Overwrites all of `out`. `sizes`: also by sizes of
-  /// shapes.
-  void pull_back(std::span<const double> field_bar, bool sizes, Cotangents& out);
+  /// Pulls the cotangent of the field back. Overwrites all of `out`. `numbers`: also by sizes of
+  /// shapes and by the layer's material.
+  void pull_back(std::span<const double> field_bar, bool numbers, Cotangents& out);
 
   /// Computes how the last field changes when the springs' fields and the shapes do: (points, 3).
   /// `touches`, `sizes`: of the shapes, with dual numbers. `stiffness_dot`: of kn.
+  /// `material_dot`: of a layer.
   void push_forward(const SpringFields& springs_dot,
                     std::span<const kernels::Touch<kernels::Dual<double>>> touches,
                     std::span<const kernels::Vec3<kernels::Dual<double>>> sizes,
-                    double stiffness_dot, std::span<double> field_dot);
+                    double stiffness_dot, const LayerMaterial& material_dot,
+                    std::span<double> field_dot);
 
  private:
   struct Point {
@@ -72,10 +75,11 @@ class LayeredField {
   void add_point(int index, int group, const kernels::Vec3<double>& xi, double normal);
   void pull_back_point(const Point& p, const kernels::Vec3<double>& slant_bar, bool sizes,
                        Cotangents& out) const;
+  void pull_back_material(Cotangents& out) const;
   [[nodiscard]] Friction friction_at(const Point& p) const;
   [[nodiscard]] LayerDepth<kernels::Dual<double>> moved(
       const Point& p, const kernels::Touch<kernels::Dual<double>>& touch,
-      const kernels::Vec3<kernels::Dual<double>>& size) const;
+      const kernels::Vec3<kernels::Dual<double>>& size, double thickness_dot) const;
   [[nodiscard]] kernels::Vec3<double> in_field(const kernels::Vec3<double>& force) const;
   [[nodiscard]] kernels::Vec3<double> to_pad(const kernels::Vec3<double>& field_bar) const;
 

@@ -63,13 +63,22 @@ struct PictureReading<T>::Impl {
   [[nodiscard]] int outward() const {
     return compiled(model).sensor_info[std::size_t(sensor.number)].pressure_sign;
   }
-  /// Computes the cotangent of the surface at the points, in the picture's order.
-  std::vector<T> surface_bar(FieldForm form, std::span<const T> picture_bar) {
+  /// Computes the cotangent of the surface at the points, in the picture's order, and adds that of
+  /// the field by which the markers moved.
+  std::vector<T> surface_bar(FieldForm form, std::span<const double> field,
+                             std::span<const T> picture_bar, std::span<double> field_bar) {
     const std::span<const T> none;
-    const bool height = form == FieldForm::height;
-    std::vector<T> bar(depth.size());
-    camera.pull_back(form == FieldForm::rgb_marker, height ? picture_bar : none,
-                     height ? none : picture_bar, bar);
+    const bool height = form == FieldForm::height, printed = form == FieldForm::rgb_marker;
+    std::vector<T> bar(depth.size()), moved_bar(printed ? 2 * depth.size() : 0);
+    camera.pull_back(printed, height ? picture_bar : none, height ? none : picture_bar, bar,
+                     moved_bar);
+    if (!printed) return bar;
+    moved.resize(moved_bar.size());
+    for (std::size_t k = 0; k < depth.size(); ++k) {
+      moved[2 * k + 1] = direction[0] * static_cast<double>(moved_bar[2 * place(k)]);
+      moved[2 * k] = direction[1] * static_cast<double>(moved_bar[2 * place(k) + 1]);
+    }
+    markers->pull_back(field, moved, field_bar);
     return bar;
   }
   /// The number of a point in the picture's order.
@@ -154,7 +163,7 @@ template <class T>
 void PictureReading<T>::pull_back(FieldForm form, std::span<const double> field,
                                   std::span<const T> picture_bar, std::span<double> field_bar) {
   Impl& m = *impl_;
-  const std::vector<T> surface_bar = m.surface_bar(form, picture_bar);
+  const std::vector<T> surface_bar = m.surface_bar(form, field, picture_bar, field_bar);
   m.moved.assign(3 * m.depth.size(), 0.0);
   for (std::size_t k = 0; k < m.depth.size(); ++k)
     m.moved[3 * k + 2] = -static_cast<double>(surface_bar[m.place(k)]);
@@ -164,9 +173,10 @@ void PictureReading<T>::pull_back(FieldForm form, std::span<const double> field,
 template <class T>
 void PictureReading<T>::pull_back_touches(FieldForm form, const kernels::TactileArgs<double>& touch,
                                           std::span<const T> picture_bar, bool sizes,
-                                          std::span<kernels::TouchCotangent<double>> touches) {
+                                          std::span<kernels::TouchCotangent<double>> touches,
+                                          std::span<double> field_bar) {
   Impl& m = *impl_;
-  const std::vector<T> surface_bar = m.surface_bar(form, picture_bar);
+  const std::vector<T> surface_bar = m.surface_bar(form, {}, picture_bar, field_bar);
   m.points.resize(m.depth.size());
   m.camera.pull_back_depth(surface_bar, m.points);
   std::vector<double> depth_bar(m.depth.size());

@@ -45,14 +45,16 @@ class PictureReading {
   /// The same in whole grey levels.
   void read(FieldForm form, std::span<std::uint8_t> picture) requires std::is_same_v<T, float>;
   /// Pulls the cotangent of a picture of a sensor with a layer back to the ideal field that was
-  /// taken last, and adds it to `field_bar`, (points, 3). The motion of markers has no derivative.
+  /// taken last, and adds it to `field_bar`, (points, 3).
   void pull_back(FieldForm form, std::span<const double> field, std::span<const T> picture_bar,
                  std::span<double> field_bar);
   /// Pulls the cotangent of a picture back to the shapes that were taken last, where
-  /// needs_depth(): pull_back_depths().
+  /// needs_depth(): pull_back_depths(). Adds that of the ideal field, by which printed markers
+  /// move, to `field_bar`, (points, 3), where needs_field().
   void pull_back_touches(FieldForm form, const kernels::TactileArgs<double>& touch,
                          std::span<const T> picture_bar, bool sizes,
-                         std::span<kernels::TouchCotangent<double>> touches);
+                         std::span<kernels::TouchCotangent<double>> touches,
+                         std::span<double> field_bar);
 
  private:
   struct Impl;

@@ -140,12 +140,13 @@ def normals_of(heights: Numbers, pixel: float) -> Numbers:
 
 
 def gel_from_device(
-    path: str | Path, output: str | Path, lamps: Sequence[int] = (1, 3, 5)
-) -> dict[str, Any]:
+    path: str | Path, output: str | Path, lamps: Sequence[int] = (1, 3, 5),
+    overwrite: bool = False,
+) -> dict[str, Any]:  # fmt: skip
     """Writes a gel file whose R, G and B are three lamps of a device, counted from 1.
 
     Returns {"rms": of the fit [grey levels], "output": path}. The background beside it is the flat
-    gel under these lamps.
+    gel under these lamps. Files that exist are kept unless `overwrite`: an InputError says so.
     """
     device = read_device(path)
     if len(lamps) != 3 or not all(1 <= k <= len(device.lamps) for k in lamps):
@@ -169,12 +170,12 @@ def gel_from_device(
 
     notes = {"device": Path(path).stem, "lamps": " ".join(map(str, lamps))}
     pixel = device.pixel * device.size[1] / cols
-    return _write_gel(Path(output), levels, background, pixel, notes)
+    return _write_gel(Path(output), levels, background, pixel, notes, overwrite)
 
 
 def gel_from_taxim(
     table: str | Path, background: str | Path, output: str | Path, pixel: float,
-    order: str = "bgr",
+    order: str = "bgr", overwrite: bool = False,
 ) -> dict[str, Any]:  # fmt: skip
     """Writes a gel file from a table of Taxim and a picture of the untouched gel.
 
@@ -184,6 +185,7 @@ def gel_from_taxim(
     background: (rows, cols, 3) as NPY, or an NPZ file with `f0`, such as dataPack.npz.
     pixel: side of a pixel of the background [m].
     order: of the channels of both, "bgr" as OpenCV reads pictures, or "rgb".
+    overwrite: replace files that exist, which is an InputError otherwise.
 
     Returns {"rms": of the fit [grey levels], "output": path}. Taxim's blur of the background and
     its shadows are not taken over.
@@ -222,20 +224,24 @@ def gel_from_taxim(
         there = picture[row.astype(int), col.astype(int)]
         return np.clip(found, -there, 255 - there)
 
-    return _write_gel(Path(output), levels, picture, pixel, {"table": Path(table).stem})
+    return _write_gel(Path(output), levels, picture, pixel, {"table": Path(table).stem}, overwrite)
 
 
 def _write_gel(
-    output: Path, levels: Any, background: Numbers, pixel: float, notes: dict[str, str]
-) -> dict[str, Any]:
+    output: Path, levels: Any, background: Numbers, pixel: float, notes: dict[str, str],
+    overwrite: bool,
+) -> dict[str, Any]:  # fmt: skip
     """Fits lamps to `levels(normals, rows, cols)`, differences to the background (…, 3), and writes
     the files."""
     if not 0 < pixel <= 0.01:
         raise _core.InputError(f"pixel {pixel}; expected the side of a pixel [m]")
+    beside = output.with_name(f"{output.stem}_background.png")
+    for path in (output, beside):
+        if path.exists() and not overwrite:
+            raise _core.InputError(f"{path} exists; expected another name, or to overwrite it")
     rows, cols, _ = background.shape
     lamps, rms = fit_lamps(levels, (rows, cols))
     picture = np.clip(np.round(background), 0, 255).astype(np.uint8)
-    beside = output.with_name(f"{output.stem}_background.png")
     lines = [f'<gel background="{beside.name}" pixel="{pixel:.6g}" blur="0">']
     said = " ".join(f'{name}="{_quoted(text)}"' for name, text in notes.items())
     lines.append(f'  <fit {said} rms="{rms:.2f}"/>')
@@ -435,6 +441,8 @@ def _arguments() -> argparse.Namespace:
     for way in (device, taxim, shade):
         what = "folder for the pictures" if way is shade else "gel file to write, XML"
         way.add_argument("-o", "--output", type=Path, required=True, help=what)
+        if way is not shade:
+            way.add_argument("--overwrite", action="store_true", help="replace files that exist")
     return parser.parse_args()
 
 
@@ -450,10 +458,10 @@ def main() -> None:
                 (args.output / f"image{k:02}.png").write_bytes(_grey_file(picture))
             print(json.dumps({"output": str(args.output), "pictures": len(lit)}))
         elif args.way == "device":
-            print(json.dumps(gel_from_device(args.file, args.output, args.lamps)))
+            print(json.dumps(gel_from_device(args.file, args.output, args.lamps, args.overwrite)))
         else:
             print(json.dumps(gel_from_taxim(args.file, args.background, args.output, args.pixel,
-                                            args.order)))  # fmt: skip
+                                            args.order, args.overwrite)))  # fmt: skip
     except (_core.InputError, OSError) as error:
         raise SystemExit(f"tangere.gel: {error}") from None
 

@@ -91,14 +91,16 @@ def test_gradients_agree_with_differences(layer):
     import tangere.torch as tt
 
     sim = tt.Simulation(
-        scene(layer=layer), 1, 60, every=60, read=["gel.rgb", "gel.height"], threads=1
+        scene(layer=layer), 1, 60, every=60, read=READINGS, threads=1
     )
     rows = torch.linspace(-1, 1, 24, dtype=torch.float64)[:, None, None]
+    cols = torch.linspace(-1, 1, 32, dtype=torch.float64)[:, None]
 
     def loss(u):
         s = sim.step(sim.reset(seed=3), u)
         assert s["gel.rgb"].shape == (1, 24, 32, 3)
-        return (s["gel.rgb"] * rows).sum() + 1e5 * (s["gel.height"] * (1 + rows)).sum()
+        marked = (s["gel.rgb_marker"] * cols).sum()
+        return marked + (s["gel.rgb"] * rows).sum() + 1e5 * (s["gel.height"] * (1 + rows)).sum()
 
     u = torch.tensor([[2e-4, 1e-4, -0.001]], dtype=torch.float64, requires_grad=True)
     loss(u).backward()

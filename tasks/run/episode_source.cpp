@@ -17,12 +17,17 @@ std::size_t number_bytes(const EpisodeOptions& options) {
   return options.precision == Precision::mixed ? sizeof(float) : sizeof(double);
 }
 
+/// Bytes of a number of a channel, in a slot's buffers and in a shard.
+std::size_t channel_bytes(const EpisodeChannel& channel, const EpisodeOptions& options) {
+  return channel.own_bytes() > 0 ? channel.own_bytes() : number_bytes(options);
+}
+
 /// Bytes of one row of one episode in a slot's buffers.
 double row_bytes(const EpisodeSource& source, const EpisodeOptions& options) {
   double bytes = static_cast<double>(source.action + (source.whole ? 1 : 0)) * sizeof(float);
   for (const EpisodeChannel& channel : source.channels)
     if (channel.requested && !channel.times.final)
-      bytes += static_cast<double>(channel.width() * number_bytes(options)) /
+      bytes += static_cast<double>(channel.width() * channel_bytes(channel, options)) /
                static_cast<double>(std::max<std::int64_t>(1, channel.times.every));
   return bytes;
 }
@@ -31,7 +36,8 @@ double row_bytes(const EpisodeSource& source, const EpisodeOptions& options) {
 double window_bytes(const EpisodeSource& source, const EpisodeOptions& options) {
   double bytes = 0;
   for (const EpisodeChannel& channel : source.channels)
-    if (channel.window > 1) bytes += static_cast<double>(channel.width() * number_bytes(options));
+    if (channel.window > 1)
+      bytes += static_cast<double>(channel.width() * channel_bytes(channel, options));
   return bytes;
 }
 

@@ -409,6 +409,24 @@ TEST(Calibrate, AGelOfDrawnPhotographsIsFound) {
   EXPECT_EQ(folder.read("gel_background.png"), folder.read("presses/background.png"));
 }
 
+/// A label beside its imprint is named, and a photograph without an imprint is no press.
+TEST(Calibrate, DoubtsLabelsThatAreFarOff) {
+  const Folder folder;
+  draw_presses(folder);
+  EXPECT_THAT(run(folder, kOfPhotographs).err, Not(HasSubstr("warning")));
+  std::string table = folder.read("presses/presses.csv");
+  const std::string last = table.substr(table.find("press_5.png"));
+  const std::string others = table.substr(0, table.find("press_5.png"));
+  folder.write("presses/presses.csv", others + "press_5.png,40,24,6\n");
+  const Outcome outcome = run(folder, kOfPhotographs);
+  EXPECT_EQ(outcome.exit_code, 0);
+  EXPECT_THAT(outcome.err, HasSubstr("warning: press_5.png: the circle of radius 6 pixels became"));
+  folder.write("presses/press_5.png", folder.read("presses/background.png"));
+  folder.write("presses/presses.csv", others + last);
+  EXPECT_THAT(run(folder, kOfPhotographs).err,
+              HasSubstr("press_5.png differs from the background by 0 levels"));
+}
+
 TEST(Calibrate, SaysWhatIsWrongWithPhotographs) {
   const Folder folder;
   draw_presses(folder);
@@ -430,6 +448,8 @@ TEST(Calibrate, SaysWhatIsWrongWithPhotographs) {
               HasSubstr("--pictures beside RECORDING, --table, --check; expected"));
   EXPECT_THAT(err({"calibrate", "--pictures", "presses", "--ball", "2e-3"}),
               HasSubstr("--pictures without --ball or --pixel"));
+  EXPECT_THAT(err({"calibrate", "--pictures", "presses", "--ball", "2", "--pixel", "2e-4"}),
+              HasSubstr("--ball 2; expected metres, 0.1 at most"));
   folder.write("presses/presses.csv", "file,x_px,y_px\npress_0.png,14,14\n");
   EXPECT_THAT(
       err(kOfPhotographs),

@@ -18,11 +18,12 @@ using nlohmann::json;
 using ::testing::HasSubstr;
 
 /// The small rolling ball with a camera of 12 x 16 pixels.
-std::string watched_scene(const Folder& folder) {
+std::string watched_scene(const Folder& folder,
+                          const std::string& size = R"(rows="12" cols="16")") {
   std::string text = file_bytes(scene("rolling_ball_small.xml"));
-  text.insert(text.find("</sensor>"),
-              "<camera name=\"eye\" pos=\"0 -0.25 0.2\" look=\"0 0 0.02\" rows=\"12\" "
-              "cols=\"16\" noise=\"2\"/>\n");
+  text.insert(
+      text.find("</sensor>"),
+      "<camera name=\"eye\" pos=\"0 -0.25 0.2\" look=\"0 0 0.02\" noise=\"2\" " + size + "/>\n");
   return folder.write("watched.xml", text);
 }
 
@@ -63,6 +64,24 @@ TEST(CameraRecord, ATrajectoryHasPicturesAtTheirTimes) {
   EXPECT_EQ(found(file, "cameras/eye/step").numbers, (std::vector<double>{60, 120}));
   EXPECT_EQ(found(file, "cameras/eye/depth_step").numbers, (std::vector<double>{120}));
   EXPECT_EQ(run(folder, {"info", "run.h5"}).exit_code, 0);
+}
+
+/// Episodes that are cut into pieces, with colours beside larger numbers.
+TEST(CameraRecord, ColoursBesideDepthsAreCutBetweenChunks) {
+  const Folder folder;
+  const std::string from = watched_scene(folder, R"(rows="128" cols="128")");
+  std::vector<std::vector<double>> rgb, depth;
+  for (const std::string tactile : {"sparse", "dense"}) {
+    run_json(folder,
+             {"generate", from, "--episodes", "1", "--steps", "48", "--every", "1", "--output",
+              tactile, "--tactile", tactile, "--record", "q,eye.rgb,eye.depth"});
+    const std::string shard = folder.path(tactile + "/shard-00000.h5");
+    rgb.push_back(found(shard, "data/demo_0/obs/eye.rgb").numbers);
+    depth.push_back(found(shard, "data/demo_0/obs/eye.depth").numbers);
+  }
+  EXPECT_EQ(rgb[0], rgb[1]);
+  EXPECT_EQ(depth[0], depth[1]);
+  EXPECT_EQ(depth[0].size(), 48U * 128 * 128);
 }
 
 TEST(CameraRecord, ShardsHaveTheSameBytesOnAnyNumberOfThreads) {

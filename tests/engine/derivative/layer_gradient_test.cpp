@@ -77,7 +77,7 @@ Numbers layer_numbers(Random& random, std::size_t n, double size) {
 using SceneOf = Scene (*)(PrimitiveShape, Pad);
 class LayerGradient : public ::testing::TestWithParam<std::tuple<SceneOf, PrimitiveShape, Pad>> {};
 
-/// By the state, by kn (of which E is a multiple) and by the size of the shape.
+/// By the state, by kn (of which E is a multiple), by the size of the shape and by t and ν.
 TEST_P(LayerGradient, DualNumbersReverseAndDifferencesAgree) {
   const auto [scene_of, shape, pad] = GetParam();
   const Scene scene = scene_of(shape, pad);
@@ -86,7 +86,9 @@ TEST_P(LayerGradient, DualNumbersReverseAndDifferencesAgree) {
   Random random(11);
   const auto nv = std::size_t(model.nv());
   const auto rows = std::size_t(m.view.rows.count);
-  const auto kn = std::size_t(m.view.rows.sensor(0)), size = std::size_t(m.view.rows.solid(2));
+  const auto kn = std::size_t(m.view.rows.sensor(0)), size = std::size_t(m.view.rows.solid(2)),
+             material = std::size_t(m.layer_row(0));
+  const bool layered = scene.sensors[0].layer.has_value();
   int touching = 0, compared = 0;
   for (int trial = 0; trial < 12; ++trial) {
     const PadState s = testing::random_pad_state(model, random);
@@ -94,6 +96,7 @@ TEST_P(LayerGradient, DualNumbersReverseAndDifferencesAgree) {
     Numbers dp(rows);
     dp[kn] = 20 * random.normal();
     for (std::size_t k = 0; k < 3; ++k) dp[size + k] = 1e-3 * random.normal();
+    if (layered) dp[material] = 1e-3 * random.normal(), dp[material + 1] = 0.05 * random.normal();
     LayerRead at(model, s);
     const Numbers here = at.field();
     if (std::all_of(here.begin(), here.end(), [](double x) { return x == 0; })) continue;
@@ -119,9 +122,11 @@ TEST_P(LayerGradient, DualNumbersReverseAndDifferencesAgree) {
     const double along = std::inner_product(weights.begin(), weights.end(), duals.begin(), 0.0);
     EXPECT_NEAR(along, back, 1e-10 * length * std::sqrt(double(weights.size())));
 
-    // Differences by the state; a difference across a point that begins to press is one-sided.
-    Numbers by_state(here.size());
-    Tangent(model).field(at.batch, 0, kLayerLane, at.tape, 0, 0, {}, {}, {dq, dv, {}, {}},
+    // Differences by the state and by the material; a difference across a point that begins to
+    // press is one-sided.
+    Numbers by_state(here.size()), of_material(rows);
+    if (layered) std::copy_n(&dp[material], 2, &of_material[material]);
+    Tangent(model).field(at.batch, 0, kLayerLane, at.tape, 0, 0, of_material, {}, {dq, dv, {}, {}},
                          by_state);
     const auto moved = [&](double e) {
       PadState t = s;
@@ -129,9 +134,13 @@ TEST_P(LayerGradient, DualNumbersReverseAndDifferencesAgree) {
         t.q = testing::moved(model, t.q, int(i), e * dq[i]);
         t.v[i] += e * dv[i];
       }
-      return LayerRead(model, t).field();
+      if (!layered) return LayerRead(model, t).field();
+      Scene other = scene;
+      other.sensors[0].material->thickness += e * dp[material];
+      other.sensors[0].layer->poisson += e * dp[material + 1];
+      return LayerRead(Model(other), t).field();
     };
-    const double e = 1e-5;
+    const double e = 1e-6;
     const Numbers up = moved(e), down = moved(-e);
     const auto pressing = [](const Numbers& f) {
       std::vector<bool> out;

@@ -31,8 +31,11 @@ Scene seen_press(double radius) {
   t.name = "gel";
   t.body = "plate";
   t.array = {{0.0065, -0.0055, 0.005}, {-0.0065, 0.0055, 0.005}, {1, 0, 0}, {0, 1, 0}, 27, 23};
-  t.coefficients = {40, 0, 0, 0};
+  t.coefficients = {40, 2, 0.6, 0};
+  t.markers = MarkersDescription{300, 0, 0, {}};
   t.picture.emplace();
+  t.picture->markers = {5, 4};
+  t.picture->marker_radius = 3e-4;
   t.picture->rows = 28, t.picture->cols = 24;
   t.picture->mirror = true;
   t.picture->gel = std::make_shared<const Gel>(default_gel());
@@ -40,15 +43,23 @@ Scene seen_press(double radius) {
   return s;
 }
 
-double weighted(const Scene& scene, const Numbers& q, FieldForm form, const Numbers& weights) {
+double weighted(const Scene& scene, const Numbers& q, const Numbers& v, FieldForm form,
+                const Numbers& weights) {
   const Model model(scene);
   Batch batch(model, 16, 0);
-  batch.set_state(kSeen, q, Numbers{0, 0, 0});
+  batch.set_state(kSeen, q, v);
   PadReader reader(model);
   reader.move(batch, 0, 0);
   reader.find_touches(batch, 0, 0, 0);
   PictureReading<double> reading(model, 0);
-  reading.set_touches(reader.arguments<double>(0, 0, kSeen));
+  const auto touch = reader.arguments<double>(0, 0, kSeen);
+  reading.set_touches(touch);
+  if (reading.needs_field(form)) {
+    const CompiledSensor& sensor = compiled(model).sensors[0];
+    Numbers field(3 * std::size_t(sensor.points()));
+    read_ideal(reader, sensor, touch, field);
+    reading.set_field(form, field);
+  }
   Numbers picture(weights.size());
   reading.read(form, std::span<double>(picture));
   double sum = 0;
@@ -58,16 +69,16 @@ double weighted(const Scene& scene, const Numbers& q, FieldForm form, const Numb
 
 TEST(PictureGradient, OfSpringsIsThatOfDifferences) {
   constexpr double kBallSize = 3e-3;
-  const Numbers q{1e-4, -2e-4, -0.9e-3};
+  const Numbers q{1e-4, -2e-4, -0.9e-3}, v{2e-3, -3e-3, 1e-3};
   const Scene scene = seen_press(kBallSize);
   const Model model(scene);
   testing::Random random(4);
-  for (const FieldForm form : {FieldForm::height, FieldForm::rgb}) {
+  for (const FieldForm form : {FieldForm::height, FieldForm::rgb, FieldForm::rgb_marker}) {
     Numbers weights(numbers_of(model.sensors()[0], form));
     const double unit = form == FieldForm::height ? 1e4 : 1;
     for (double& w : weights) w = unit * random.uniform(0, 1);
     Batch batch(model, 16, 0);
-    batch.set_state(kSeen, q, Numbers{0, 0, 0});
+    batch.set_state(kSeen, q, v);
     ReadoutPullback pullback(model);
     BlockCotangent c;
     for (auto* x : {&c.q, &c.v}) x->assign(3 * 16, 0.0);
@@ -79,19 +90,28 @@ TEST(PictureGradient, OfSpringsIsThatOfDifferences) {
     double largest = 0;
     for (std::size_t k = 0; k < 3; ++k) largest = std::max(largest, std::abs(c.q[16 * k + kSeen]));
     EXPECT_GT(largest, 1);
-    const double step = 1e-9;
+    const double step = 1e-9, faster = 1e-7;
+    double by_motion = 0;
     for (std::size_t k = 0; k < 3; ++k) {
-      Numbers more = q, less = q;
-      more[k] += step, less[k] -= step;
-      const double expected =
-          (weighted(scene, more, form, weights) - weighted(scene, less, form, weights)) /
-          (2 * step);
-      EXPECT_NEAR(c.q[16 * k + kSeen], expected, 1e-4 * largest) << to_string(form) << " " << k;
+      const auto along = [&](double dq, double dv) {
+        Numbers q_there = q, v_there = v;
+        q_there[k] += dq, v_there[k] += dv;
+        return weighted(scene, q_there, v_there, form, weights);
+      };
+      EXPECT_NEAR(c.q[16 * k + kSeen], (along(step, 0) - along(-step, 0)) / (2 * step),
+                  1e-4 * largest)
+          << to_string(form) << " " << k;
+      const double by_v = c.v[16 * k + kSeen];
+      EXPECT_NEAR(by_v, (along(0, faster) - along(0, -faster)) / (2 * faster),
+                  1e-4 * std::max(1.0, std::abs(by_v)))
+          << to_string(form) << " " << k;
+      by_motion = std::max(by_motion, std::abs(by_v));
     }
+    EXPECT_EQ(by_motion > 1, form == FieldForm::rgb_marker);
     const double by_radius =
         c.parameters[std::size_t(compiled(model).view.rows.solid(1)) * 16 + kSeen];
-    const double expected = (weighted(seen_press(kBallSize + step), q, form, weights) -
-                             weighted(seen_press(kBallSize - step), q, form, weights)) /
+    const double expected = (weighted(seen_press(kBallSize + step), q, v, form, weights) -
+                             weighted(seen_press(kBallSize - step), q, v, form, weights)) /
                             (2 * step);
     EXPECT_NEAR(by_radius, expected, 1e-4 * largest) << to_string(form);
   }

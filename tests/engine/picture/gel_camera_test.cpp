@@ -321,5 +321,56 @@ TEST(GelCamera, PullsBackToTheDepth) {
   EXPECT_GT(contacts, 15);
 }
 
+/// By the motion of printed markers, with discs that overlap and others that leave the picture.
+TEST(GelCamera, PullsBackToTheMotionOfItsMarkers) {
+  PictureDescription picture = picture_of(random_gel(6), 24, 32);
+  picture.markers = {4, 3};
+  picture.marker_radius = 1.2e-3;
+  picture.gain = 0.1;
+  GelCamera<double> camera = camera_of<double>(picture, 12, 16, 1e-3);
+  camera.set_draws({1, 1, 1});
+  const Numbers depth = ball<double>(12, 16, 1e-4, -3e-4, 1e-3);
+  testing::Random random(8);
+  Numbers colour_bar(3 * 24 * 32), moved(2 * 12 * 16);
+  for (double& x : colour_bar) x = random.uniform(-1, 1);
+  for (double& x : moved) x = 3e-4 * random.uniform(-1, 1);
+  const auto loss = [&](const Numbers& at) {
+    camera.move_markers(at);
+    const Numbers seen = colours<double>(camera, depth, true);
+    double sum = 0;
+    for (std::size_t k = 0; k < seen.size(); ++k) sum += colour_bar[k] * seen[k];
+    return sum;
+  };
+  static_cast<void>(loss(moved));
+  Numbers surface_bar(depth.size()), moved_bar(moved.size());
+  camera.pull_back(true, {}, colour_bar, surface_bar, moved_bar);
+  double largest = 0;
+  for (const double x : moved_bar) largest = std::max(largest, std::abs(x));
+  EXPECT_GT(largest, 1e3);
+  for (std::size_t k = 0; k < moved.size(); ++k) {
+    Numbers more = moved, less = moved;
+    more[k] += 1e-9, less[k] -= 1e-9;
+    EXPECT_NEAR(moved_bar[k], (loss(more) - loss(less)) / 2e-9, 1e-5 * largest) << k;
+  }
+}
+
+/// Light sees a surface that the gel blurs; heights are those of the surface.
+TEST(GelCamera, HeightsAreNotBlurred) {
+  Gel gel = grey_gel(100);
+  gel.blur = 5e-4;
+  const Numbers depth = ball<double>(30, 40, 0, 0, 1e-3);
+  const auto highest = [&](double blur) {
+    gel.blur = blur;
+    PictureDescription picture = picture_of(gel, 60, 80);
+    GelCamera<double> camera = camera_of<double>(picture, 30, 40);
+    camera.set_depth(depth);
+    Numbers height(60 * 80);
+    camera.read_height(height);
+    return *std::max_element(height.begin(), height.end());
+  };
+  EXPECT_EQ(highest(5e-4), highest(0));
+  EXPECT_NEAR(highest(5e-4), *std::max_element(depth.begin(), depth.end()), 3e-5);
+}
+
 }  // namespace
 }  // namespace tangere

@@ -259,7 +259,7 @@ TEST(GelLayer, DerivativesAgreeWithDifferences) {
   gel.solve(layer, depth, 0.4);
   Numbers depth_bar(depth.size()), pressure_dot(depth.size());
   gel.pull_back(bar, depth_bar);
-  gel.push_forward(dot, pressure_dot);
+  gel.push_forward(dot, {}, pressure_dot);
   double forward = 0, back = 0, size = 0;
   for (std::size_t s = 0; s < depth.size(); ++s) {
     forward += bar[s] * pressure_dot[s];
@@ -279,6 +279,50 @@ TEST(GelLayer, DerivativesAgreeWithDifferences) {
   for (std::size_t s = 0; s < depth.size(); ++s)
     if (gel.pressure()[s] > 1e-3) {
       EXPECT_NEAR((up[s] - down[s]) / (2 * e), pressure_dot[s], 1e-6) << s;
+    }
+}
+
+/// By t and ν, of a reading and of a contact. Depths are in units of which t is 4.
+TEST(GelLayer, DerivativesByTheMaterialAgreeWithDifferences) {
+  for (const bool feedback : {false, true})
+    for (const LayerMaterial dot : {LayerMaterial{1, 0}, LayerMaterial{0, 1}}) {
+      const auto made = [&](double e) {
+        CompiledLayer layer =
+            layer_of(10, 2, 0.8, 4.1 + e * dot.thickness, 0.45 + e * dot.poisson, 0.4);
+        layer.feedback = feedback;
+        return layer;
+      };
+      const CompiledLayer layer = made(0);
+      const Numbers depth = depths(layer, ball(5, 0.7)), still(depth.size());
+      const auto pressures = [&](double e) {
+        GelLayer there;
+        there.solve(made(e), depth, 0.4);
+        return Numbers(there.pressure().begin(), there.pressure().end());
+      };
+      GelLayer gel;
+      gel.solve(layer, depth, 0.4);
+      Numbers bar, depth_bar(depth.size()), change(depth.size());
+      std::mt19937_64 random(3);
+      std::normal_distribution<double> normal;
+      for (std::size_t s = 0; s < depth.size(); ++s) bar.push_back(normal(random));
+      gel.push_forward(still, dot, change);
+      gel.pull_back(bar, depth_bar);
+      const LayerMaterial back = gel.pull_back_material(bar);
+      double forward = 0, size = 0, largest = 0;
+      for (std::size_t s = 0; s < depth.size(); ++s) {
+        forward += bar[s] * change[s];
+        size += std::abs(bar[s] * change[s]);
+        largest = std::max(largest, std::abs(change[s]));
+      }
+      EXPECT_GT(largest, 1e-3);
+      EXPECT_NEAR(forward, dot.thickness * back.thickness + dot.poisson * back.poisson,
+                  1e-12 * size);
+      const double e = 1e-6;
+      const Numbers up = pressures(e), down = pressures(-e);
+      for (std::size_t s = 0; s < depth.size(); ++s)
+        if (gel.pressure()[s] > 1e-3) {
+          EXPECT_NEAR((up[s] - down[s]) / (2 * e), change[s], 1e-7 * largest) << s;
+        }
     }
 }
 
