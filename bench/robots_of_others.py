@@ -172,7 +172,7 @@ def main() -> None:
     files = [
         path
         for path in sorted(given.folder.rglob("*"))
-        if path.suffix.lower() in (".urdf", ".xml")
+        if path.suffix.lower() in (".urdf", ".xml", ".mjcf")
         and path.is_file()
         and not (given.skip and given.skip in str(path))
         and is_robot(path)

@@ -75,7 +75,8 @@ class Bodies {
                                {"gravcomp"},
                                {"sleep", Fate::idle, "a setting of MuJoCo's solver"},
                                {"user", Fate::idle, "numbers for other programs"}}));
-    if (node.flag("mocap", false)) node.lost("<body> mocap: moved by another program");
+    if (node.flag("mocap", false))
+      node.changed("<body> mocap: stands where the file has it; no program moves it");
     const std::string name =
         node.has("name") ? unique_body(placed) : whole_.names.free_name("body");
     const Pose place = compose(parent_offset, compose(placed.frame, placed.file().read_pose(node)));
@@ -162,7 +163,7 @@ class Bodies {
     }
     offset.position = {0 - anchor[0], 0 - anchor[1], 0 - anchor[2]};
     if (chain.empty()) {
-      const bool moves = whole_.free_base && parent < 0;
+      const bool moves = whole_.free_base && parent < 0 && !node.flag("mocap", false);
       JointDescription fixed;
       fixed.type = moves ? JointType::free : JointType::fixed;
       fixed.name = whole_.names.free_name(name + (moves ? "_free" : "_fixed"));
@@ -172,7 +173,9 @@ class Bodies {
       ends.push_back({-2});
     }
     std::optional<Pose> inertia;
-    const std::vector<RobotPiece> pieces = read_pieces(body, parts, offset, inertia);
+    const bool idle = chain.size() == 1 && stands(robot_, chain.front(), parent);
+    const std::vector<RobotPiece> pieces =
+        read_pieces(body, parts, offset, idle ? Moments::idle : Moments::needed, inertia);
     const bool has_bodies = std::any_of(parts.begin(), parts.end(), [](const MjcfPart& part) {
       return part.node.name() == "body";
     });
@@ -293,14 +296,15 @@ class Bodies {
   /// The geoms of a body and its mass, in the frame of its link. `principal`: the frame of its
   /// inertia in that of the body, where the file gives it: by diaginertia or one primitive.
   std::vector<RobotPiece> read_pieces(const MjcfPart& body, const std::vector<MjcfPart>& parts,
-                                      const Pose& offset, std::optional<Pose>& principal) {
+                                      const Pose& offset, Moments moments,
+                                      std::optional<Pose>& principal) {
     std::optional<RobotPiece> inertial;
     bool has_inertial = false;
     for (const MjcfPart& part : parts) {
       if (part.node.name() != "inertial") continue;
       if (has_inertial) part.node.fail("given twice; expected once");
       has_inertial = true;
-      inertial = read_inertial(part);
+      inertial = read_inertial(part, moments);
       if (part.node.has("diaginertia"))
         principal = compose(part.frame, part.file().read_pose(part.node));
       if (inertial) inertial->pose = compose(offset, compose(part.frame, inertial->pose));
@@ -331,7 +335,7 @@ class Bodies {
     return pieces;
   }
 
-  std::optional<RobotPiece> read_inertial(const MjcfPart& part) {
+  std::optional<RobotPiece> read_inertial(const MjcfPart& part, Moments moments) {
     const RobotNode& node = part.node;
     node.check(with_rotations({{"mass"}, {"diaginertia"}, {"fullinertia"}}));
     const double mass = node.not_negative("mass");
@@ -348,7 +352,7 @@ class Bodies {
     if (part.file().balance_inertia && balance_inertia(inertia))
       node.changed("<inertial>: all moments are their mean, as balanceinertia says");
     return inertial_piece(robot_, mass, inertia, part.file().read_pose(node), "<inertial>",
-                          node.source());
+                          node.source(), moments);
   }
 
   /// Appends a geom, unless it is for pictures only, and its mass where that stands apart.

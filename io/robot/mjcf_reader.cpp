@@ -437,11 +437,11 @@ void read_mjcf(const RobotNode& root, const std::string& keyframe, bool free_bas
   for (const MjcfScope* model : whole.models)
     for (const RobotNode& section : model->file->sections) {
       if (section.name() != "contact") continue;
-      for (const RobotNode& exclude :
-           section.parts({{"pair", Fate::lost,
-                           "a contact with coefficients of MuJoCo's; --contact A=B adds one"},
-                          {"exclude"}}))
-        read_exclude(whole, model->model, exclude);
+      for (const RobotNode& part : section.parts({{"pair"}, {"exclude"}}))
+        if (part.name() == "pair")
+          part.changed("<pair>: no contact, as of all that may touch; --contact A=B adds one");
+        else
+          read_exclude(whole, model->model, part);
     }
   if (key) read_mjcf_keyframe(whole, *key);
   file.take_warnings(root.context().warnings);

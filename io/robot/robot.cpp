@@ -171,8 +171,8 @@ constexpr double kNearly = 1e-6;     // of the moments: that much is rounding
 constexpr double kWeight = 1000;     // of a ball in place of a point [kg/m³]
 constexpr double kBallMoment = 0.4;  // of a ball, in mass times its radius squared
 
-/// Adds the same to all moments, as little as gives those of a solid. Returns how much of them.
-double make_possible(std::array<double, 6>& inertia) {
+/// Adds the same to all moments, as little as makes them `possible`. Returns how much of them.
+double raise(std::array<double, 6>& inertia, bool (*possible)(const std::array<double, 6>&)) {
   const double whole = std::abs(inertia[0]) + std::abs(inertia[3]) + std::abs(inertia[5]) +
                        2 * (std::abs(inertia[1]) + std::abs(inertia[2]) + std::abs(inertia[4]));
   const auto with = [&](double share) {
@@ -183,7 +183,7 @@ double make_possible(std::array<double, 6>& inertia) {
   double no = 0, yes = 2;
   for (int k = 0; k < 40; ++k) {
     const double middle = 0.5 * (no + yes);
-    (is_solid_inertia(with(middle)) ? yes : no) = middle;
+    (possible(with(middle)) ? yes : no) = middle;
   }
   inertia = with(yes + kNearly);
   return yes;
@@ -191,18 +191,32 @@ double make_possible(std::array<double, 6>& inertia) {
 
 }  // namespace
 
+bool stands(const Robot& robot, const JointDescription& joint, int parent) {
+  if (joint.type != JointType::fixed) return false;
+  for (int k = parent; k >= 0; k = robot.scene.links[std::size_t(k)].parent)
+    if (robot.scene.links[std::size_t(k)].joint.type != JointType::fixed) return false;
+  return true;
+}
+
 std::optional<RobotPiece> inertial_piece(Robot& robot, double mass, std::array<double, 6> inertia,
                                          const Pose& pose, const std::string& origin,
-                                         const Source& source, bool may_be_point) {
+                                         const Source& source, Moments moments) {
   if (!(mass >= 0))
     throw InputError(
         fmt::format("{}{}: mass {} kg; expected 0 or more", source.prefix(), origin, mass));
   const bool none = std::all_of(inertia.begin(), inertia.end(), [](double x) { return x == 0; });
   if (mass == 0) {
-    if (!none) robot.lost.add(source, origin + ": an inertia without a mass; it is left out");
+    if (!none && moments == Moments::idle)
+      robot.idle.add(source, origin + ": an inertia without a mass of a link that stands");
+    else if (!none)
+      robot.lost.add(source, origin + ": an inertia without a mass; it is left out");
     return std::nullopt;
   }
-  if (none && may_be_point) {
+  if (moments == Moments::idle && !is_inertia(inertia)) {
+    robot.idle.add(source,
+                   origin + ": moments of inertia that are not positive, of a link that stands");
+    inertia = {};
+  } else if (none && moments == Moments::dispensable) {
     robot.changed.add(source, origin + ": a mass without an inertia, which is a point on its link");
   } else if (none) {
     const double radius = std::cbrt(3 * mass / (4 * 3.14159265358979323846 * kWeight));
@@ -210,12 +224,16 @@ std::optional<RobotPiece> inertial_piece(Robot& robot, double mass, std::array<d
     inertia = {moment, 0, 0, moment, 0, moment};
     robot.lost.add(source, origin + ": a mass without an inertia; it is that of a ball of water");
   } else if (!is_inertia(inertia)) {
-    if (make_possible(inertia) > kNearly)
+    std::array<double, 6> raised = inertia;
+    if (raise(raised, is_inertia) > kNearly) {
+      raise(inertia, is_solid_inertia);
       robot.lost.add(source, origin +
                                  ": a principal moment of the inertia is below 0; all moments are "
                                  "raised until a solid has them");
-    else
+    } else {
+      inertia = raised;
       robot.changed.add(source, origin + ": the inertia of a thin rod, raised by 1e-6");
+    }
   } else if (!is_solid_inertia(inertia)) {
     robot.changed.add(source,
                       origin +

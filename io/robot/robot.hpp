@@ -125,13 +125,20 @@ int add_link(Robot& robot, RobotNames& names, const std::string& name, int paren
              JointDescription joint, const std::vector<RobotPiece>& pieces,
              const std::string& origin, const Source& source);
 
+/// Whether the motion needs moments of inertia of a piece. dispensable: a point in its place
+/// leaves the mass matrix positive. idle: its link stands in the world.
+enum class Moments { needed, dispensable, idle };
+
+/// Whether a link on `joint` of link `parent` (-1: the world) stands in the world.
+bool stands(const Robot& robot, const JointDescription& joint, int parent);
+
 /// A piece that is a mass alone. `inertia`: xx xy xz yy yz zz in the frame `pose` at the centre of
 /// mass. Where a principal moment is not positive, another inertia takes its place, and the robot
-/// lists that. `may_be_point`: an inertia of zeros is kept. Without a mass there is no piece.
+/// lists that. Without `moments`, an inertia of zeros is kept. Without a mass there is no piece.
 /// Throws InputError at `source` if the mass is negative.
 std::optional<RobotPiece> inertial_piece(Robot& robot, double mass, std::array<double, 6> inertia,
                                          const Pose& pose, const std::string& origin,
-                                         const Source& source, bool may_be_point = false);
+                                         const Source& source, Moments moments = Moments::needed);
 
 /// Scales all masses so that they add up to `total` [kg].
 void scale_masses(Scene& scene, double total);

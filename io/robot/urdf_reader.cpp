@@ -353,9 +353,9 @@ class UrdfReader {
                         joint.source);
       joint = rest;
     }
-    const bool carried = joint.type == JointType::fixed && has_inertia(parent);
-    const int index = add_link(robot_, names_, name, parent, std::move(joint),
-                               pieces_of(node, carried), origin, node.source());
+    const std::vector<RobotPiece> pieces = pieces_of(node, joint, parent);
+    const int index =
+        add_link(robot_, names_, name, parent, std::move(joint), pieces, origin, node.source());
     for (Joint& next : joints_) {
       if (next.parent != name) continue;
       next.used = true;
@@ -379,8 +379,26 @@ class UrdfReader {
     return false;
   }
 
-  /// `carried`: the link is fixed to one with an inertia, so its own mass may be a point.
-  [[nodiscard]] std::vector<RobotPiece> pieces_of(const RobotNode& node, bool carried) const {
+  /// Whether a link on `joint` of link `parent` needs moments of inertia, if its mass lies at
+  /// `centre` of its frame. A point off the axis of its own joint moves whenever the joint does, so
+  /// that the mass matrix stays positive.
+  [[nodiscard]] Moments moments_of(const JointDescription& joint, int parent,
+                                   const Vector3& centre) const {
+    constexpr double kOff = 1e-3;  // [m]
+    if (stands(robot_, joint, parent)) return Moments::idle;
+    const Vector3& a = joint.axis0;
+    const double along = centre[0] * a[0] + centre[1] * a[1] + centre[2] * a[2];
+    const double off =
+        std::hypot(centre[0] - along * a[0], centre[1] - along * a[1], centre[2] - along * a[2]);
+    const bool moves =
+        joint.type == JointType::prismatic || (joint.type == JointType::revolute && off > kOff);
+    const bool carried = joint.type == JointType::fixed && has_inertia(parent);
+    return moves || carried ? Moments::dispensable : Moments::needed;
+  }
+
+  /// Of a link on `joint` of link `parent`.
+  [[nodiscard]] std::vector<RobotPiece> pieces_of(const RobotNode& node,
+                                                  const JointDescription& joint, int parent) const {
     std::vector<RobotPiece> pieces;
     const std::vector<RobotNode> parts = node.parts(kLinkChildren);
     for (const RobotNode& part : parts) {
@@ -404,9 +422,9 @@ class UrdfReader {
     }
     if (balances_ && balance_inertia(I))
       inertial->changed("<inertial>: all moments are their mean, as balanceinertia says");
-    if (auto piece =
-            inertial_piece(robot_, mass.number("value"), I, read_origin(last_of(inside, "origin")),
-                           "<inertial>", inertial->source(), carried))
+    const Pose pose = read_origin(last_of(inside, "origin"));
+    if (auto piece = inertial_piece(robot_, mass.number("value"), I, pose, "<inertial>",
+                                    inertial->source(), moments_of(joint, parent, pose.position)))
       pieces.push_back(std::move(*piece));
     return pieces;
   }

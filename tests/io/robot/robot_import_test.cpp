@@ -217,6 +217,14 @@ TEST(RobotImport, InertiasThatNoSolidHasAreMendedAndListed) {
   EXPECT_THAT(rod.lost, IsEmpty());
   EXPECT_THAT(rod.changed, Contains(HasSubstr("the inertia of a thin rod")));
   EXPECT_NEAR(inertia_of(rod)[5], 0, 1e-4);
+  // Rank one: all numbers are alike.
+  const ImportedScene flat =
+      inertial("ixx=\"1\" ixy=\"1\" ixz=\"1\" iyy=\"1\" iyz=\"1\" izz=\"1\"");
+  EXPECT_THAT(flat.lost, IsEmpty());
+  EXPECT_THAT(flat.changed, Contains(HasSubstr("the inertia of a thin rod")));
+  EXPECT_EQ(inertia_of(flat)[1], 1);
+  EXPECT_NEAR(inertia_of(flat)[0], 1, 2e-5);
+  EXPECT_GT(inertia_of(flat)[0], 1);
   const ImportedScene point =
       import_link("<inertial><mass value=\"4.18879020478639\"/></inertial>");
   EXPECT_THAT(point.lost, ElementsAre(HasSubstr("a mass without an inertia")));

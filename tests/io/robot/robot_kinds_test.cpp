@@ -454,5 +454,91 @@ TEST_F(RobotKinds, GeomsThatTouchNothingHaveAMassAlone) {
                   HasSubstr("no shape to touch with: its geoms have contype and conaffinity 0")));
 }
 
+/// Base `a` carries link `b`, whose mass at `centre` has no moments, on a joint of `type` along z.
+std::string carried_point(const std::string& centre, const std::string& type) {
+  return "<robot name=\"r\"><link name=\"a\"><inertial><mass value=\"2\"/></inertial></link>"
+         "<link name=\"b\"><inertial><origin xyz=\"" +
+         centre + "\"/><mass value=\"1\"/></inertial></link><joint name=\"j\" type=\"" + type +
+         "\"><parent link=\"a\"/><child link=\"b\"/><axis xyz=\"0 0 1\"/>" +
+         (type == "prismatic" ? "<limit lower=\"-1\" upper=\"1\"/>" : "") + "</joint></robot>";
+}
+
+/// A mass off the axis of its joint moves with it, so a point will do. One in a link that stands
+/// moves nothing.
+TEST_F(RobotKinds, AMassWithoutAnInertiaMayBeAPoint) {
+  const ImportedScene off = import(carried_point("0.1 0 0.3", "continuous"));
+  EXPECT_THAT(off.lost, IsEmpty());
+  EXPECT_THAT(off.changed,
+              Contains(HasSubstr("a mass without an inertia, which is a point on its link")));
+  EXPECT_THAT(off.idle, Contains(HasSubstr("not positive, of a link that stands")));
+  EXPECT_THAT(import(carried_point("0 0 0.3", "prismatic")).lost, IsEmpty());
+  EXPECT_THAT(import(carried_point("0 0 0.3", "continuous")).lost,
+              ElementsAre(HasSubstr("a mass without an inertia; it is that of a ball of water")));
+  RobotOptions free;
+  free.free_base = true;
+  write("free.urdf", carried_point("0.1 0 0.3", "continuous"));
+  EXPECT_THAT(import_robot(folder_ / "free.urdf", folder_ / "scene.xml", free).lost,
+              ElementsAre(HasSubstr("it is that of a ball of water")));
+
+  // A torque of 0.02 N m turns 0.01 kg m² at 2 rad/s²; the first step is BDF1's.
+  Scene pendulum = scene(carried_point("0.1 0 0.3", "continuous"));
+  pendulum.motors.push_back({"j", -0.02, 0.02, {}});
+  const Model model(pendulum);
+  Batch batch(model, 1);
+  Stepper stepper(model);
+  const double u = 1;
+  stepper.step(batch, {&u, 1});
+  double v = 0;
+  batch.get_v(0, {&v, 1});
+  EXPECT_NEAR(v, 2 * model.timestep(), 1e-12);
+}
+
+TEST_F(RobotKinds, MassesOfLinksThatStandAreIdle) {
+  const auto base = [&](const std::string& inertial, bool moves) {
+    write("base.urdf", "<robot name=\"r\"><link name=\"a\"><inertial>" + inertial +
+                           "</inertial></link></robot>");
+    RobotOptions options;
+    options.free_base = moves;
+    return import_robot(folder_ / "base.urdf", folder_ / "scene.xml", options);
+  };
+  const std::string none = "<mass value=\"0\"/><inertia ixx=\"1\" iyy=\"1\" izz=\"1\"/>",
+                    below = "<mass value=\"1\"/><inertia ixx=\"1\" iyy=\"1\" izz=\"-1\"/>";
+  EXPECT_THAT(base(none, false).lost, IsEmpty());
+  EXPECT_THAT(base(none, false).idle,
+              Contains(HasSubstr("an inertia without a mass of a link that stands")));
+  EXPECT_THAT(base(below, false).lost, IsEmpty());
+  EXPECT_THAT(base(below, false).idle, Contains(HasSubstr("not positive")));
+  EXPECT_THAT(base(below, true).lost, ElementsAre(HasSubstr("is below 0")));
+  const ImportedScene mjcf = import(
+      "<mujoco><worldbody><body name=\"a\"><inertial mass=\"1\" pos=\"0 0 0\" diaginertia=\"0 0 "
+      "0\"/>"
+      "<body name=\"b\"><joint name=\"j\"/><geom "
+      "size=\"0.1\"/></body></body></worldbody></mujoco>");
+  EXPECT_THAT(mjcf.lost, IsEmpty());
+  EXPECT_THAT(mjcf.idle, Contains(HasSubstr("not positive, of a link that stands")));
+}
+
+/// Without a program that moves it, a mocap body of MuJoCo stands, also in a free base.
+TEST_F(RobotKinds, BodiesThatAProgramMovesStand) {
+  const std::string text =
+      "<mujoco><worldbody><body name=\"ball\" pos=\"0 0 1\"><geom name=\"ball\" "
+      "size=\"0.1\"/></body>"
+      "<body name=\"hand\" mocap=\"true\" pos=\"0 1 2\"><geom name=\"hand\" size=\"0.1\"/></body>"
+      "</worldbody><contact><pair geom1=\"ball\" geom2=\"hand\" friction=\"1 1 0.1 0.1 0.1\"/>"
+      "</contact></mujoco>";
+  write("robot.xml", text);
+  RobotOptions free;
+  free.free_base = true;
+  const ImportedScene made = import_robot(folder_ / "robot.xml", folder_ / "scene.xml", free);
+  EXPECT_THAT(made.lost, IsEmpty());
+  EXPECT_THAT(made.changed, Contains(HasSubstr("<body> mocap: stands where the file has it")));
+  EXPECT_THAT(made.changed, Contains(HasSubstr("<pair>: no contact, as of all that may touch")));
+  const Scene scene = parse_scene(made.text, folder_ / "scene.xml").scene;
+  ASSERT_EQ(scene.links.size(), 2);
+  EXPECT_EQ(scene.links[0].joint.type, JointType::free);
+  EXPECT_EQ(scene.links[1].joint.type, JointType::fixed);
+  EXPECT_EQ(scene.links[1].joint.pose.position, (Vector3{0, 1, 2}));
+}
+
 }  // namespace
 }  // namespace tangere
