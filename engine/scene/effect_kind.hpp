@@ -16,6 +16,8 @@ enum class EffectKind : std::uint8_t {
   armature,
   force_motors,
   position_motors,
+  loops,
+  transmissions,
   pair_contact,
   pair_friction,
   pair_damping,
@@ -35,6 +37,6 @@ enum class EffectKind : std::uint8_t {
   varying_parameters,
   sleeping,
 };
-inline constexpr int kEffectKinds = 27;
+inline constexpr int kEffectKinds = 29;
 
 }  // namespace tangere

@@ -99,6 +99,20 @@ EffectInfo find_motors(const Scene& scene, int /*element*/) {
                  "controls");
 }
 
+// --- loops and transmissions ---
+
+EffectInfo find_loops(const Scene& scene, int /*element*/) {
+  return counted(
+      scene.loops, [](const auto&) { return 1; }, std::mem_fn(&LoopDescription::source), "loop",
+      "loops");
+}
+
+EffectInfo find_transmissions(const Scene& scene, int /*element*/) {
+  return counted(
+      scene.transmissions, [](const auto&) { return 1; },
+      std::mem_fn(&TransmissionDescription::source), "transmission", "transmissions");
+}
+
 // --- contacts and sensors ---
 
 using Kind = EffectKind;
@@ -318,6 +332,8 @@ constexpr Row kTable[] = {
     {Kind::armature, "armature", "", find_in_joints<Field::armature>},
     {Kind::force_motors, "force motors", "", find_motors<MotorControl::force>},
     {Kind::position_motors, "position motors", "", find_motors<MotorControl::position>},
+    {Kind::loops, "closed loops", "", find_loops},
+    {Kind::transmissions, "transmissions", "", find_transmissions},
     element_row<Owner::contact, Kind::pair_contact>("pair contact"),
     element_row<Owner::contact, Kind::pair_friction>("pair friction", " friction"),
     element_row<Owner::contact, Kind::pair_damping>("pair damping", " damping"),

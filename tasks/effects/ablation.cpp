@@ -94,6 +94,47 @@ void drop_motors(Scene& scene, MotorControl control, Ablation way) {
   keep_controls(scene, kept);
 }
 
+// --- loops and transmissions ---
+
+void drop_loops(Scene& scene) {
+  std::erase_if(scene.randomizations,
+                [](const auto& d) { return d.number.owner == NumberOwner::loop; });
+  scene.loops.clear();
+}
+
+/// Removes transmissions with their joints, which carry nothing, and all that names these.
+void drop_transmissions(Scene& scene) {
+  const auto is_one = [&](const std::string& joint) {
+    return std::ranges::any_of(scene.transmissions,
+                               [&](const auto& d) { return d.joint == joint; });
+  };
+  std::vector<bool> kept;
+  for (const MotorDescription& motor : scene.motors)
+    kept.insert(kept.end(), std::size_t(dofs_driven(scene, motor)), !is_one(motor.joint));
+  keep_controls(scene, kept);
+  std::erase_if(scene.motors, [&](const auto& motor) { return is_one(motor.joint); });
+  std::erase_if(scene.initial, [&](const auto& start) { return is_one(start.joint); });
+  std::erase_if(scene.end_effectors, [&](const auto& tip) { return is_one(tip.joint); });
+  std::vector<int> place;  // of every link in what is left
+  int left = 0;
+  for (const LinkDescription& link : scene.links)
+    place.push_back(is_one(link.joint.name) ? left : left++);
+  const auto is_gone = [&](const LinkDescription& link) { return is_one(link.joint.name); };
+  std::erase_if(scene.randomizations, [&](const RandomizationDescription& d) {
+    const bool names_body = std::ranges::any_of(scene.links, [&](const LinkDescription& link) {
+      return is_gone(link) && link.body.name == d.number.name;
+    });
+    return d.number.owner == NumberOwner::body
+               ? names_body
+               : (d.number.owner == NumberOwner::joint || d.number.owner == NumberOwner::motor) &&
+                     is_one(d.number.name);
+  });
+  std::erase_if(scene.links, is_gone);
+  for (LinkDescription& link : scene.links)
+    if (link.parent >= 0) link.parent = place[std::size_t(link.parent)];
+  scene.transmissions.clear();
+}
+
 // --- contacts and sensors ---
 
 void drop_imperfections(Scene& scene, int element, Ablation way) {
@@ -231,6 +272,8 @@ void drop(Scene& scene, const Effect& effect, Ablation way) {
     case Kind::armature: drop_from_joints(scene, Field::armature, way); break;
     case Kind::force_motors: drop_motors(scene, MotorControl::force, way); break;
     case Kind::position_motors: drop_motors(scene, MotorControl::position, way); break;
+    case Kind::loops: drop_loops(scene); break;
+    case Kind::transmissions: drop_transmissions(scene); break;
     case Kind::sensor_imperfections: drop_imperfections(scene, effect.element, way); break;
     case Kind::markers: drop_markers(scene, effect.element, way); break;
     case Kind::layer: drop_layer(scene, effect.element); break;
@@ -247,7 +290,8 @@ void drop(Scene& scene, const Effect& effect, Ablation way) {
 bool has_way(EffectKind kind, Ablation way) {
   if (kind == Kind::velocity_products) return false;
   if (way == Ablation::zero)
-    return kind != Kind::gravity && kind != Kind::sleeping && kind != Kind::layer;
+    return kind != Kind::gravity && kind != Kind::sleeping && kind != Kind::layer &&
+           kind != Kind::loops && kind != Kind::transmissions;
   return way == Ablation::removed || kind == Kind::joint_limits;
 }
 

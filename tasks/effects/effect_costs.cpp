@@ -45,6 +45,8 @@ TimedParts parts_of(const Model& model, const Effect& effect) {
     case EffectKind::varying_parameters: return {true, true, 1, false};
     case EffectKind::force_motors: return {true, false, 1, true};
     case EffectKind::pair_contact:
+    case EffectKind::loops:
+    case EffectKind::transmissions:
     case EffectKind::feedback: return {true, false, 2, false};
     default: return {!reads, reads, 1, false};
   }

@@ -19,16 +19,26 @@ using kernels::kBlock;
 /// Environments that are solved together; half a block.
 constexpr int kLanesOfGroup = kBlock / 2;
 
-/// Controls have the names of the dofs that they drive, so a name stands for one control.
-std::vector<std::size_t> columns_of(const Model& model, const Model& of) {
+/// Returns where the numbers with the names `names` are among those recorded: joints without a
+/// transmission, controls without their motors. `what`: "control", "coordinate" …
+std::vector<std::size_t> columns_of(std::span<const std::string> names,
+                                    std::span<const std::string> recorded, const char* what) {
   std::vector<std::size_t> columns;
-  for (const std::string& name : model.u_names()) {
-    const auto at = std::find(of.u_names().begin(), of.u_names().end(), name);
-    if (at == of.u_names().end())
-      throw InputError("no control '" + name + "' in the run that was recorded");
-    columns.push_back(static_cast<std::size_t>(at - of.u_names().begin()));
+  for (const std::string& name : names) {
+    const auto at = std::find(recorded.begin(), recorded.end(), name);
+    if (at == recorded.end())
+      throw InputError(std::string("no ") + what + " '" + name + "' in the run that was recorded");
+    columns.push_back(static_cast<std::size_t>(at - recorded.begin()));
   }
   return columns;
+}
+
+/// Returns the numbers in `columns` of environment `e`, of `width` recorded for each.
+std::vector<double> numbers_at(const std::vector<double>& recorded, std::size_t e,
+                               std::size_t width, const std::vector<std::size_t>& columns) {
+  std::vector<double> numbers;
+  for (const std::size_t column : columns) numbers.push_back(recorded[e * width + column]);
+  return numbers;
 }
 
 }  // namespace
@@ -42,22 +52,25 @@ TimedModel::TimedModel(const Model& model, const RecordedStates& recorded,
       readout_(model),
       outputs_(requested_fields(model.scene())) {
   std::erase_if(outputs_, [](const FieldOutput& of) { return is_view(of.form); });
-  const std::vector<std::size_t> columns = columns_of(model, recorded.model);
-  const std::size_t nq = as_size(model.nq()), nv = as_size(model.nv());
-  const std::size_t nu = as_size(recorded.model.nu());
+  const Model& run = recorded.model;
+  const std::vector<std::size_t> q_columns =
+                                     columns_of(model.q_names(), run.q_names(), "coordinate"),
+                                 v_columns = columns_of(model.v_names(), run.v_names(), "rate"),
+                                 u_columns = columns_of(model.u_names(), run.u_names(), "control");
+  const std::size_t nq = as_size(run.nq()), nv = as_size(run.nv()), nu = as_size(run.nu());
   set_numbers();
   for (const RecordedInstant& at : recorded.instants) {
     std::vector<double> u;
     for (int e = 0; e < batch_.environments(); ++e) {
       const std::size_t i = as_size(e);
-      const std::span<const double> q = std::span(at.q).subspan(i * nq, nq);
-      const std::span<const double> v = std::span(at.v).subspan(i * nv, nv);
+      const std::vector<double> q = numbers_at(at.q, i, nq, q_columns),
+                                v = numbers_at(at.v, i, nv, v_columns);
       if (at.previous_q.empty())
         batch_.set_state(e, q, v);
       else
-        batch_.set_state(e, q, v, std::span(at.previous_q).subspan(i * nq, nq),
-                         std::span(at.previous_v).subspan(i * nv, nv));
-      for (const std::size_t column : columns) u.push_back(at.controls[i * nu + column]);
+        batch_.set_state(e, q, v, numbers_at(at.previous_q, i, nq, q_columns),
+                         numbers_at(at.previous_v, i, nv, v_columns));
+      for (const double x : numbers_at(at.controls, i, nu, u_columns)) u.push_back(x);
     }
     starts_.emplace_back();
     for (int b = 0; b < batch_.blocks(); ++b) starts_.back().push_back(batch_.save_block(b));

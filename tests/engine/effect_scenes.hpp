@@ -64,8 +64,31 @@ inline Scene scene_that_sleeps() {
   return s;
 }
 
-/// The same with shear springs and dry friction of a joint, which are not to be had together with
-/// sleep.
+/// Ties the slider to the world by a soft loop, and spans a cord with a spring between the two.
+inline void add_loop_and_transmission(Scene& s) {
+  LoopDescription tie;
+  tie.name = "tie", tie.body1 = "slider";
+  tie.position2 = Vector3{0.51, 0, 0.35};
+  tie.stiffness = 40, tie.damping = 0.2;
+  s.loops.push_back(tie);
+  LinkDescription cord;
+  cord.name = cord.body.name = "cord";
+  cord.joint.name = "cord_joint";
+  cord.joint.type = JointType::prismatic;
+  cord.joint.stiffness = 30, cord.joint.rest = {0.02};
+  cord.body.shape = AbstractShape{};
+  s.links.insert(s.links.begin(), cord);
+  for (LinkDescription& other : s.links)
+    if (other.parent >= 0) ++other.parent;
+  TransmissionDescription path;
+  path.joint = "cord_joint";
+  path.path = {{PathPart::Kind::point, "", {0.5, 0.05, 0.3}},
+               {PathPart::Kind::point, "slider", {0.01, 0, 0}}};
+  s.transmissions.push_back(path);
+}
+
+/// The same with shear springs, dry friction of a joint and a transmission, which are not to be had
+/// together with sleep, and a loop.
 inline Scene scene_that_remembers() {
   Scene s = scene_that_sleeps();
   s.solver.sleep = 0;
@@ -73,6 +96,7 @@ inline Scene scene_that_remembers() {
   for (GroundContactDescription& d : s.ground_contacts) d.coefficients.ks = 500;
   for (TactileDescription& d : s.sensors) d.coefficients.ks = 0.5;
   s.links[3].joint.friction = 0.02;
+  add_loop_and_transmission(s);
   return s;
 }
 

@@ -88,6 +88,42 @@ TEST(TimedModel, FindsControlsAndNumbersOfATrimmedScene) {
   }
 }
 
+/// A transmission is the first joint of the run. Without it the others have other places. Its path
+/// has no stiffness, so that the motion is the same.
+TEST(TimedModel, FindsCoordinatesOfASceneWithoutItsTransmission) {
+  Scene scene = short_run();
+  LinkDescription cord;
+  cord.name = cord.body.name = cord.joint.name = "cord";
+  cord.joint.type = JointType::prismatic;
+  cord.body.shape = AbstractShape{};
+  scene.links.insert(scene.links.begin(), cord);
+  for (LinkDescription& link : scene.links)
+    if (link.parent >= 0) ++link.parent;
+  TransmissionDescription path;
+  path.joint = "cord";
+  path.path = {{PathPart::Kind::point, "", {0, 0, 0.2}}, {PathPart::Kind::point, "ball"}};
+  scene.transmissions.push_back(path);
+  const Model model(scene);
+  const RecordedStates states = record_states(model, kPlayed, kPlayedSteps, 3);
+  const Model trimmed(without(scene, {EffectKind::transmissions}));
+  ASSERT_EQ(trimmed.nq(), model.nq() - 1);
+  TimedModel timed(trimmed, states, {{}, {}, Stepper(model).tolerance()});
+  const auto nq = std::size_t(model.nq());
+  std::vector<double> q(nq - 1);
+  for (int i = 0; i + 1 < kPlayedSteps; ++i) {
+    EXPECT_EQ(timed.time_step(i).failures, 0);
+    double most = 0;
+    for (int e = 0; e < kPlayed; ++e) {
+      timed.batch().get_q(e, q);
+      for (std::size_t k = 0; k + 1 < nq; ++k)
+        most = std::max(
+            most,
+            std::abs(q[k] - states.instants[std::size_t(i) + 1].q[std::size_t(e) * nq + k + 1]));
+    }
+    EXPECT_LT(most, 1e-9) << i;
+  }
+}
+
 /// A step that accepts every first guess evaluates the residual once per stage, and steps are not
 /// cut to the scene's accuracy.
 TEST(TimedModel, StagesAreCounted) {
