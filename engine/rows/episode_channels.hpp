@@ -42,6 +42,13 @@ struct EpisodeChannel {
   [[nodiscard]] std::size_t reading_width() const {
     return width() / static_cast<std::size_t>(window);
   }
+  /// Place in the window of the reading that is due after step `step`, 0 to K - 1, of a row of
+  /// `steps_per_row` = K steps; none where none is due.
+  [[nodiscard]] std::optional<std::size_t> window_place(int step, int steps_per_row) const {
+    const int between = steps_per_row / window, after = step + 1;
+    if (after % between != 0) return std::nullopt;
+    return static_cast<std::size_t>(after / between - 1);
+  }
   /// Bytes of a number whose type does not follow the precision of the run; else 0.
   [[nodiscard]] std::size_t own_bytes() const {
     return kind == Kind::reading ? tangere::own_bytes(reading.form) : task_bytes;

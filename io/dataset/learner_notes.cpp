@@ -2,6 +2,8 @@
 // The names are those of the Python package, tangere.gym.
 #include "io/dataset/learner_notes.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
@@ -15,6 +17,19 @@ constexpr int kGymnasium = 2;  // robomimic's number for environments of Gym
 /// Names come from scene files and may hold any bytes.
 std::string text_of(const Json& json) {
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+/// Of a task of the catalogue. A task in Python says itself which readings it shows.
+std::vector<std::string> stored_readings(const DatasetLayout& layout) {
+  std::vector<std::string> words;
+  if (!layout.task || !layout.python_class.empty()) return words;
+  for (const EpisodeChannel& channel : layout.channels()) {
+    if (channel.kind != EpisodeChannel::Kind::reading || !channel.requested) continue;
+    words.push_back(channel.window == 1
+                        ? channel.name
+                        : fmt::format("{}/{}", channel.name, layout.every / channel.window));
+  }
+  return words;
 }
 
 }  // namespace
@@ -33,6 +48,8 @@ std::string robomimic_environment(const DatasetLayout& layout) {
   Json arguments = Json::object();
   if (layout.task)
     arguments["task"] = layout.python_class.empty() ? layout.task->name : layout.python_class;
+  if (const std::vector<std::string> readings = stored_readings(layout); !readings.empty())
+    arguments["readings"] = readings;
   Json environment = {
       {"env_name", layout.task ? environment_id(layout.task->name) : layout.scene_name},
       {"type", kGymnasium},
@@ -41,10 +58,25 @@ std::string robomimic_environment(const DatasetLayout& layout) {
   return text_of(environment);
 }
 
-std::string gymnasium_environment(const std::string& task, const std::string& python_class) {
+std::vector<std::string> readings_in(const std::string& environment) {
+  const Json all = Json::parse(environment, nullptr, false);
+  std::vector<std::string> words;
+  if (!all.is_object()) return words;
+  const auto arguments = all.find("env_kwargs");
+  if (arguments == all.end() || !arguments->is_object()) return words;
+  const auto readings = arguments->find("readings");
+  if (readings == arguments->end() || !readings->is_array()) return words;
+  for (const Json& word : *readings)
+    if (word.is_string()) words.push_back(word.get<std::string>());
+  return words;
+}
+
+std::string gymnasium_environment(const std::string& task, const std::string& python_class,
+                                  const std::vector<std::string>& readings) {
   const bool in_python = !python_class.empty();
   Json arguments = {{"task", in_python ? python_class : task}};
   if (!in_python) arguments["normalise"] = false;
+  if (!readings.empty()) arguments["readings"] = readings;
   return text_of(
       {{"id", environment_id(task)},
        {"entry_point", in_python ? "tangere.scene_env:SceneEnv" : "tangere.gym:make_env"},

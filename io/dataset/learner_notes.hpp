@@ -15,12 +15,19 @@ namespace tangere {
 std::string environment_id(const std::string& task);
 
 /// `env_args` of robomimic: {"env_name", "type", "env_kwargs", "env_version"}. For a scene alone
-/// the name is the scene's, and there are no arguments.
+/// the name is the scene's, and there are no arguments. Arguments of a task of the catalogue have
+/// the readings of sensors that are stored beside what it observes.
 std::string robomimic_environment(const DatasetLayout& layout);
 
 /// `env_spec` of Minari: Gymnasium's EnvSpec of a task whose observations are those of the files,
-/// in SI units. `python_class`: DatasetLayout::python_class.
-std::string gymnasium_environment(const std::string& task, const std::string& python_class = "");
+/// in SI units. `python_class`: DatasetLayout::python_class. `readings`: those of readings_in() that
+/// the environment shows beside them.
+std::string gymnasium_environment(const std::string& task, const std::string& python_class = "",
+                                  const std::vector<std::string>& readings = {});
+
+/// The readings of sensors, "pad.sum" or "pad/1", that robomimic_environment() names; none for
+/// another text.
+std::vector<std::string> readings_in(const std::string& environment);
 
 /// {KEY: number, or list over the last axis} of every stored observation that declares a scale, in
 /// the observation's unit. Other observations have the scale 1.

@@ -102,6 +102,13 @@ MinariView::MinariView(const std::string& folder, const h5::Id& shard, const Dem
       python_class_ = h5::read_text(scene, "python_class");
     const std::vector<std::string> players = h5::read_texts(scene, "policies");
     if (!players.empty()) policy_ = players.front();  // a program by its own name
+    for (const std::string& word :
+         readings_in(h5::read_text(h5::open_group(shard, "/data"), "env_args"))) {
+      const std::string name = word.substr(0, word.find('/'));
+      if (std::any_of(members_.observations.begin(), members_.observations.end(),
+                      [&](const DemoArray& array) { return array.name == name; }))
+        readings_.push_back(word);
+    }
     low_ = bound(h5::read_number<double>(scene, "action_low"));
     high_ = bound(h5::read_number<double>(scene, "action_high"));
   }
@@ -172,7 +179,7 @@ std::string MinariView::metadata(std::uint64_t bytes) const {
       {"requirements", Json::array({"tangere>=" + version_})},
   };
   if (!task_.empty()) {
-    const std::string environment = gymnasium_environment(task_, python_class_);
+    const std::string environment = gymnasium_environment(task_, python_class_, readings_);
     metadata["env_spec"] = environment;
     metadata["eval_env_spec"] = environment;
   }

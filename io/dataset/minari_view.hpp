@@ -41,6 +41,7 @@ class MinariView {
   std::string id_, folder_, to_folder_;  // the last: the way back from the view
   std::string command_, version_;
   std::string task_, python_class_, policy_;  // empty for a scene alone
+  std::vector<std::string> readings_;         // of sensors, beside what the task observes
   std::string low_ = "-1.0", high_ = "1.0";
   std::optional<GrownFile> file_;
   std::vector<h5::FileMember> episodes_;

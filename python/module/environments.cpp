@@ -4,6 +4,7 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include "io/files/nearest_name.hpp"
 #include "python/module/arrays.hpp"
 #include "python/module/batch_arrays.hpp"
 #include "python/module/module.hpp"
@@ -20,12 +21,32 @@ using nb::literals::operator""_a;
 
 namespace {
 
+/// The readings that words name, "pad.sum" or "pad/1". Throws InputError for a name that no sensor
+/// of the scene has.
+std::vector<TimedName> readings_named(const std::vector<std::string>& words, const Task& task) {
+  std::vector<TimedName> readings;
+  const std::vector<std::string> sensors = sensor_names(task.model().scene());
+  for (const std::string& word : words) {
+    const TimedName& reading = readings.emplace_back(split_times(word));
+    if (!find_output(sensors, reading.name))
+      throw InputError(fmt::format("readings: no sensor has '{}'{}", reading.name,
+                                   suggestion(reading.name, output_names(sensors))));
+  }
+  return readings;
+}
+
+VectorOptions options_with(VectorOptions options, const std::vector<std::string>& readings,
+                           const Task& task) {
+  options.readings = readings_named(readings, task);
+  return options;
+}
+
 class Environments {
  public:
   Environments(const std::string& task, const Scene& scene, int environments,
-               const VectorOptions& options)
+               const VectorOptions& options, const std::vector<std::string>& readings)
       : task_(make_task(task, scene)),
-        vector_(*task_, environments, options),
+        vector_(*task_, environments, options_with(options, readings, *task_)),
         readout_(task_->model()),
         policies_{Policy(*task_, PolicyKind::scripted), Policy(*task_, PolicyKind::random)} {}
 
@@ -52,6 +73,49 @@ class Environments {
   nb::dict observations(bool scaled, const std::optional<std::vector<std::string>>& keys) {
     const InUse::Turn turn(in_use_);
     return observation_arrays(spec(), vector_.observations(), count(), scaled, keys);
+  }
+  /// Name → (E, shape of a row).
+  nb::dict readings() {
+    const InUse::Turn turn(in_use_);
+    nb::dict arrays;
+    const std::vector<EpisodeChannel>& channels = vector_.readings();
+    for (std::size_t k = 0; k < channels.size(); ++k) {
+      Shape shape{count()};
+      shape.insert(shape.end(), channels[k].shape.begin(), channels[k].shape.end());
+      const char* const name = channels[k].name.c_str();
+      if (channels[k].own_bytes() == 1)
+        arrays[name] = array_of<std::uint8_t>(shape, vector_.colours(k));
+      else
+        arrays[name] = array_of<float>(shape, vector_.reading(k));
+    }
+    return arrays;
+  }
+  /// What readings() has.
+  [[nodiscard]] std::vector<TensorSpec> reading_specs() const {
+    std::vector<TensorSpec> specs;
+    for (const EpisodeChannel& channel : vector_.readings()) {
+      constexpr double kBrightest = 255;
+      const bool colours = channel.own_bytes() == 1;
+      TensorSpec& spec = specs.emplace_back();
+      spec.name = channel.name;
+      spec.shape = {channel.shape.begin(), channel.shape.end()};
+      spec.unit = channel.unit;
+      spec.meaning = channel.meaning;
+      spec.low = colours ? 0 : -TensorSpec::kUnbounded;
+      spec.high = colours ? kBrightest : TensorSpec::kUnbounded;
+      spec.touch = channel.touch;
+      spec.own_bytes = channel.own_bytes();
+    }
+    return specs;
+  }
+  /// Name → time between the readings of a window [s].
+  [[nodiscard]] nb::dict windows() const {
+    nb::dict seconds;
+    for (const EpisodeChannel& channel : vector_.readings())
+      if (channel.window > 1)
+        seconds[channel.name.c_str()] =
+            spec().steps_per_action / channel.window * model().timestep();
+    return seconds;
   }
   Array<double> actions_of(std::size_t policy) {
     std::span<double> numbers;
@@ -156,16 +220,18 @@ void add_environments(nb::module_& m) {
           [](Environments* self, const std::string& task, const Scene& scene,
              const Whole<int>& envs, const Whole<std::uint64_t>& seed,
              const Whole<std::int64_t>& first_episode, const std::optional<Whole<int>>& threads,
-             bool autoreset) {
+             bool autoreset, const std::vector<std::string>& readings) {
             VectorOptions options{seed.value("seed"), first_episode.value("first_episode"),
                                   threads_of(threads)};
             options.autoreset = autoreset;
-            new (self) Environments(task, scene, envs.value("num_envs"), options);
+            new (self) Environments(task, scene, envs.value("num_envs"), options, readings);
           },
           "task"_a, "scene"_a, "num_envs"_a, "seed"_a = 0, "first_episode"_a = 0,
-          "threads"_a = nb::none(), "autoreset"_a = true,
-          "Makes E environments and starts their episodes. InputError: no such task, or the scene\n"
-          "does not belong to it.")
+          "threads"_a = nb::none(), "autoreset"_a = true, "readings"_a = std::vector<std::string>(),
+          "Makes E environments and starts their episodes. `readings`: of sensors, beside what "
+          "the\n"
+          "task observes: 'pad.sum', or a window 'pad/1'. InputError: no such task or reading, or\n"
+          "the scene does not belong to the task.")
       .def("reset", &Environments::reset, "seed"_a, "first_episode"_a = 0,
            "Starts the first episodes of a seed.")
       .def("restart", &Environments::restart, "which"_a,
@@ -178,6 +244,14 @@ void add_environments(nb::module_& m) {
                    "-> dict[str, numpy.typing.NDArray[numpy.float32]]"),
            "A dict of new float32 arrays (E, …), divided by their scales if `scaled`, else in SI\n"
            "units.")
+      .def("readings", &Environments::readings,
+           nb::sig("def readings(self) -> dict[str, numpy.typing.NDArray]"),
+           "A dict of new arrays (E, …) of the readings that were requested: float32 in SI units,\n"
+           "pictures in colours uint8.")
+      .def_prop_ro("reading_specs", &Environments::reading_specs, "What readings() has.")
+      .def_prop_ro("windows", &Environments::windows,
+                   nb::for_getter(nb::sig("def windows(self) -> dict[str, float]")),
+                   "Name → time between the readings of a window [s].")
       .def("rewards", numbers<double>(&VectorTask::rewards), "(E) of the last step.")
       .def("terminated", numbers<bool>(&VectorTask::terminated), "(E) bool: the episode ended.")
       .def("truncated", numbers<bool>(&VectorTask::truncated),

@@ -39,7 +39,8 @@ ExistingShards existing_named(const std::string& name) {
 
 /// Throws InputError for what no file can hold.
 DatasetLayout layout_of(const Model& model, const TaskSpec& task, std::int64_t episodes,
-                        std::uint64_t seed, const PlayedBy& played_by) {
+                        std::uint64_t seed, const PlayedBy& played_by,
+                        const std::vector<std::string>& readings) {
   constexpr std::int64_t kMostEpisodes = 1'000'000'000;
   if (episodes < 1 || episodes > kMostEpisodes)
     throw InputError(fmt::format("{} episodes; expected 1 to {}", episodes, kMostEpisodes));
@@ -51,6 +52,11 @@ DatasetLayout layout_of(const Model& model, const TaskSpec& task, std::int64_t e
   layout.steps = std::int64_t{task.horizon} * task.steps_per_action;
   layout.every = task.steps_per_action;
   layout.seed = seed;
+  if (!readings.empty()) {  // beside everything else
+    layout.record = {{"q"}, {"v"}};
+    for (const TensorSpec& tensor : task.observations) layout.record.push_back({tensor.name});
+    for (const std::string& word : readings) layout.record.push_back(split_times(word));
+  }
   layout.precision = to_string(Precision::mixed);
   layout.single = true;
   layout.version = TANGERE_VERSION;
@@ -80,6 +86,12 @@ class EpisodeWriter {
       shapes_.emplace_back(channel.shape.begin(), channel.shape.end());
       own_bytes_.push_back(channel.own_bytes());
     }
+  }
+
+  [[nodiscard]] std::vector<std::string> observation_names() const {
+    std::vector<std::string> names;
+    for (const EpisodeChannel& channel : layout_.channels()) names.push_back(channel.name);
+    return names;
   }
 
   [[nodiscard]] std::vector<std::pair<std::int64_t, std::int64_t>> missing() {
@@ -200,10 +212,10 @@ void add_episode_writer(nb::module_& m) {
              const std::string& python_class, const std::string& command,
              const std::string& existing, const std::string& compression,
              const std::string& pictures, bool sparse, const std::string& set_name,
-             const Whole<std::int64_t>& shards) {
+             const Whole<std::int64_t>& shards, const std::vector<std::string>& readings) {
             if (player != policy) check_policy_name("the policy", player);
             DatasetLayout layout = layout_of(model, task, episodes.value("episodes"),
-                                             seed.value("seed"), {policy, {player}});
+                                             seed.value("seed"), {policy, {player}}, readings);
             layout.python_class = python_class;
             layout.command = command;
             layout.compression = compression;
@@ -216,9 +228,11 @@ void add_episode_writer(nb::module_& m) {
           "model"_a, "task"_a, "folder"_a, "episodes"_a, "seed"_a, "policy"_a, "player"_a,
           "python_class"_a, "command"_a, "existing"_a = "refuse", "compression"_a = "none",
           "pictures"_a = "raw", "sparse"_a = true, "set_name"_a = "", "shards"_a = 0,
+          "readings"_a = std::vector<std::string>(),
           "Creates the folder. `policy`: as requested; `player`: the name of the one that plays.\n"
           "`python_class`: \"MODULE:CLASS\" of the task. `command`: what makes the data set "
           "again.\n"
+          "`readings`: of sensors, beside what the task observes: 'pad.sum', 'pad/5'.\n"
           "`existing`: 'refuse' shards that are there, 'replace' or 'keep' them. The others are\n"
           "options of `tangere generate`; shards 0: as many as fit. InputError: no\n"
           "file can hold a name, or kept shards have other settings. IoError: the folder cannot "
@@ -226,6 +240,8 @@ void add_episode_writer(nb::module_& m) {
           "written, is in use, has shards, or the disk has no room.")
       .def("missing", &EpisodeWriter::missing,
            "Ranges [first, end) of episodes to write, in whole blocks of 16 except the last.")
+      .def_prop_ro("observation_names", &EpisodeWriter::observation_names,
+                   "Names of the observations in the order in which `write` takes them.")
       .def("write", &EpisodeWriter::write, "first_episode"_a, "actions"_a, "observations"_a,
            "rewards"_a, "randomized"_a, "lengths"_a, "returns"_a, "terminated"_a, "success"_a,
            "failures"_a, "steps"_a,

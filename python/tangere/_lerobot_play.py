@@ -113,7 +113,8 @@ def play(
     if not callable(policy):
         policy = Checkpoint(policy, origin["text"])
     num_envs = min(num_envs, episodes)
-    env = _environment(chosen, num_envs, threads)
+    shown = {key for feature in features for key in feature.keys}
+    env = _environment(chosen, num_envs, threads, shown, origin.get("windows", {}))
     start = getattr(policy, "reset", lambda: None)
     found = play_episodes(
         env, lambda obs: policy(_frames(env, obs, features)), start, episodes, seed
@@ -123,13 +124,24 @@ def play(
 
 
 def _environment(
-    task: str | type[scene_env.VectorSceneEnv], num_envs: int, threads: int | None
-) -> Any:
+    task: str | type[scene_env.VectorSceneEnv], num_envs: int, threads: int | None,
+    keys: set[str], windows: dict[str, Any],
+) -> Any:  # fmt: skip
+    """Shows the `keys`, of which `windows` says how many seconds lie between readings."""
     if not isinstance(task, str):
         return task(num_envs, threads=threads)
     if task not in _core.task_names():
         raise _core.InputError(f"task {task!r} is not of the catalogue; expected its class")
-    return gym.make_vec(task, num_envs, threads=threads, normalise=False)
+    scene = gym.task_scene(task)
+    step = _core.Model(scene).timestep
+    declared = {"q", "v", *(tensor.name for tensor in _core.task_spec(task).observations)}
+    readings = [
+        f"{key}/{round(windows[key]['seconds'] / step)}" if key in windows else key
+        for key in sorted(keys - declared)
+    ]
+    return gym.make_vec(
+        task, num_envs, threads=threads, normalise=False, scene=scene, readings=readings
+    )
 
 
 def _frames(env: Any, obs: Frames, features: list[Feature]) -> Frames:

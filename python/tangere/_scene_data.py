@@ -66,7 +66,7 @@ def generate(
     again += f", options={lasting})" if lasting else ")"
     writer = _core.EpisodeWriter(
         env.model, spec, str(output), episodes, seed, kind, player, where, again,
-        **_storage(options, spec.name),
+        readings=env._readings.words, **_storage(options, spec.name),
     )  # fmt: skip
     with closing(writer):
         run = _Run(env, policy if callable(policy) else None, writer)
@@ -128,7 +128,7 @@ def _spec(env: VectorSceneEnv) -> _core.TaskSpec:
             own_bytes=0 if env._types[key] == np.float32 else env._types[key].itemsize,
         )  # fmt: skip
         for key, shape in env._shapes.items()
-        if key not in _STATE
+        if key not in (*_STATE, *env._readings.between)
     ]
     scene = env.model.scene
     return _core.TaskSpec(
@@ -162,7 +162,8 @@ class _Run:
         places = 2 * -(-env.num_envs // _BLOCK)
         slots, most = places * _BLOCK, env.horizon
         state = {"q": (env.model.nq,), "v": (env.model.nv,)}
-        shapes = state | {key: shape[1:] for key, shape in env._shapes.items() if key not in _STATE}
+        seen = {key: shape[1:] for key, shape in env._shapes.items()} | state
+        shapes = {key: seen[key] for key in writer.observation_names}
         try:  # memory is taken when rows are written
             self.rows = {
                 k: np.empty((slots, most + 1, *s), env._types.get(k, np.float32))

@@ -66,13 +66,14 @@ def replay_buffer(
 
 def play(
     algorithm: Any, task: str | type[VectorSceneEnv], episodes: int = 300, *,
-    keys: Sequence[str] | None = None, seed: int = TEST_SEED, num_envs: int = 64,
-    threads: int | None = None,
+    keys: Sequence[str] | None = None, readings: Sequence[str] = (), seed: int = TEST_SEED,
+    num_envs: int = 64, threads: int | None = None,
 ) -> dict[str, Any]:  # fmt: skip
     """Plays fresh episodes of a task by whatever has d3rlpy's `predict(observations)`.
 
     task: a name of `tangere.task_names()`, or a class of `tangere.VectorSceneEnv`.
-    keys: those of the replay buffer. seed: of the episodes; not that of the data set.
+    keys: those of the replay buffer. readings: those of them that sensors give beside what the
+        task observes, as in `tangere.make_vec`: "pad.sum", "pad/1". seed: of the episodes; not that of the data set.
 
     Returns "task", "seed", "episodes", "successes", "success_rate", the bounds of its 95 % interval
     after Wilson in "interval", "mean_return" and "mean_actions".
@@ -87,7 +88,8 @@ def play(
         seen, name = _core.task_spec(task).observations, task
         known = [tensor.name for tensor in seen]
         hidden = [tensor.name for tensor in seen if tensor.privileged]
-        env = gym.make_vec(task, min(num_envs, episodes), threads=threads)
+        env = gym.make_vec(task, min(num_envs, episodes), threads=threads, readings=readings)
+        known += [word.partition("/")[0] for word in readings]
     else:
         raise _core.InputError(
             f"task {task!r}; expected the name of a task, or a class of tangere.VectorSceneEnv"

@@ -46,25 +46,23 @@ def observation_scale(tensor: _core.TensorSpec) -> float | list[float]:
 
 
 def observation_space(
-    spec: _core.TaskSpec, keys: Sequence[str], normalise: bool, flatten: bool
+    tensors: Sequence[_core.TensorSpec], normalise: bool, flatten: bool
 ) -> spaces.Space:
-    """The space of one environment's observations."""
+    """The space of one environment's observations, which are `tensors`."""
     boxes: dict[str, spaces.Space] = {}
     parts: list[spaces.Box] = []
-    for tensor in spec.observations:
-        if tensor.name not in keys:
-            continue
+    for tensor in tensors:
         scale = np.broadcast_to(np.asarray(observation_scale(tensor)), tensor.shape)
         by = scale if normalise else np.ones(tensor.shape)
-        box = spaces.Box(
-            (tensor.low / by).astype(np.float32), (tensor.high / by).astype(np.float32)
-        )
+        low, high = tensor.low / by, tensor.high / by
+        kind = np.uint8 if tensor.own_bytes == 1 else np.float32
+        box = spaces.Box(low.astype(kind), high.astype(kind), dtype=kind)
         boxes[tensor.name] = box
         parts.append(box)
     if not flatten:
         return spaces.Dict(boxes)
-    low = np.concatenate([box.low.ravel() for box in parts])
-    high = np.concatenate([box.high.ravel() for box in parts])
+    low = np.concatenate([box.low.ravel() for box in parts], dtype=np.float32)
+    high = np.concatenate([box.high.ravel() for box in parts], dtype=np.float32)
     return spaces.Box(low, high)
 
 
@@ -111,6 +109,10 @@ class VectorTaskEnv(EpisodesEnv):
         ones of the episode.
         "disabled": the environment stands still until `reset(options={"reset_mask": m})`.
     keys: the observations to show; None for all that the task declares.
+    readings: of sensors of the scene to show beside them, named as in `tangere generate --record`:
+        "pad.sum" at every row, "pad/1" as a window of all readings since the row before, (E, n, …).
+        In SI units, with the numbers of the data set. They are shown whatever `keys` says, which
+        may then be [].
     scene: another scene than the one of the task, or the path of its file.
     render_mode: "rgb_array" for pictures by `render`; "human" for a window, which every reset and
         step draws anew, at most `metadata["render_fps"]` times a second. It needs pygame.
@@ -128,20 +130,22 @@ class VectorTaskEnv(EpisodesEnv):
         flatten: bool = False,
         autoreset: Autoreset = "next_step",
         keys: Sequence[str] | None = None,
+        readings: Sequence[str] = (),
         scene: _core.Scene | str | Path | None = None,
         render_mode: RenderMode = None,
     ) -> None:
         arguments = {k: v for k, v in locals().items() if k not in ("self", "__class__")}
         before = set(self.__dict__)
         self._arguments = arguments
-        if isinstance(keys, str):
-            raise _core.InputError(f"keys {keys!r}; expected a list, such as [{keys!r}]")
+        for argument, words in (("keys", keys), ("readings", readings)):
+            if isinstance(words, str):
+                raise _core.InputError(f"{argument} {words!r}; expected a list, such as [{words!r}]")
         seed = system_seed() if seed is None else checked_seed(seed)
         check_choices(num_envs, autoreset)
         self.task = _core.task_spec(task)
         names = [tensor.name for tensor in self.task.observations]
         unknown = [key for key in keys or () if key not in names]
-        if unknown or keys is not None and not keys:
+        if unknown or keys is not None and not keys and not readings:
             raise _core.InputError(f"keys {list(keys or ())}; task {task!r} has {names}")
         self.keys = [name for name in names if keys is None or name in keys]
         self.normalise, self.flatten = normalise, flatten
@@ -155,7 +159,9 @@ class VectorTaskEnv(EpisodesEnv):
             first_episode=first_episode,
             threads=threads,
             autoreset=autoreset == "next_step",
+            readings=list(readings),
         )
+        self._readings = self._env.reading_specs
         self._seed, self._first_episode, self._fresh = seed, first_episode, True
         self.render_mode = render_mode
         self.metadata = {
@@ -167,8 +173,9 @@ class VectorTaskEnv(EpisodesEnv):
         action = self.task.action
         self.single_action_space = spaces.Box(action.low, action.high, action.shape, np.float32)
         self.action_space = batch_space(self.single_action_space, num_envs)
+        shown = [tensor for tensor in self.task.observations if tensor.name in self.keys]
         self.single_observation_space = observation_space(
-            self.task, self.keys, normalise, flatten
+            [*shown, *self._readings], normalise, flatten
         )
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self._made = {*self.__dict__, "_made"} - before
@@ -184,8 +191,14 @@ class VectorTaskEnv(EpisodesEnv):
 
     @property
     def observation_scale(self) -> dict[str, float | list[float]]:
-        """KEY → what its observations are divided by, in SI units."""
-        return {t.name: observation_scale(t) for t in self.task.observations}
+        """KEY → what its observations are divided by, in SI units; of readings 1."""
+        shown = [*self.task.observations, *self._readings]
+        return {tensor.name: observation_scale(tensor) for tensor in shown}
+
+    @property
+    def windows(self) -> dict[str, float]:
+        """KEY → time between the readings of a window [s], of those that `readings` names."""
+        return self._env.windows
 
     @property
     def model(self) -> _core.Model:
@@ -265,10 +278,11 @@ class VectorTaskEnv(EpisodesEnv):
         return self._env.counts()
 
     def _observe(self) -> Observation:
-        arrays = self._env.observations(self.normalise, self.keys)
+        arrays = self._env.observations(self.normalise, self.keys) | self._env.readings()
         if not self.flatten:
             return arrays
-        return np.concatenate([arrays[k].reshape(self.num_envs, -1) for k in self.keys], axis=1)
+        parts = [array.reshape(self.num_envs, -1) for array in arrays.values()]
+        return np.concatenate(parts, axis=1, dtype=np.float32)
 
     def _info(self) -> dict[str, Any]:
         every = np.ones(self.num_envs, bool)
@@ -362,6 +376,7 @@ class TaskEnv(Remade, SingleEnv):
         normalise: bool = True,
         flatten: bool = False,
         keys: Sequence[str] | None = None,
+        readings: Sequence[str] = (),
         scene: _core.Scene | str | Path | None = None,
         render_mode: RenderMode = None,
     ):
@@ -378,6 +393,7 @@ class TaskEnv(Remade, SingleEnv):
             flatten=flatten,
             autoreset="disabled",
             keys=keys,
+            readings=readings,
             scene=scene,
             render_mode=render_mode,
         )
@@ -391,8 +407,13 @@ class TaskEnv(Remade, SingleEnv):
 
     @property
     def observation_scale(self) -> dict[str, float | list[float]]:
-        """KEY → what its observations are divided by, in SI units."""
+        """KEY → what its observations are divided by, in SI units; of readings 1."""
         return self._vector.observation_scale
+
+    @property
+    def windows(self) -> dict[str, float]:
+        """KEY → time between the readings of a window [s], as in `VectorTaskEnv`."""
+        return self._vector.windows
 
     def scripted_action(self) -> np.ndarray:
         """(na): what the task's own script does here. It may use the whole state."""

@@ -37,6 +37,7 @@ class EnvTangere(EnvBase):  # type: ignore[misc]
     env_name: the Gymnasium id of the task, such as "tangere/BoxPushing-v0".
     task: its name, as `env_kwargs` of a file have it. None: the one that env_name names.
     seed, first_episode: of the first episode. None: a seed from the system.
+    readings: of sensors, windows among them, as `env_kwargs` of a file have them.
     render, render_offscreen, use_image_obs, use_depth_obs: must be False, because there are
         no pictures.
     postprocess_visual_obs, lang: have no meaning here.
@@ -53,6 +54,7 @@ class EnvTangere(EnvBase):  # type: ignore[misc]
         task: str | None = None,
         seed: int | None = None,
         first_episode: int = 0,
+        readings: Sequence[str] = (),
         use_depth_obs: bool = False,
         lang: Any = None,
     ):
@@ -69,9 +71,11 @@ class EnvTangere(EnvBase):  # type: ignore[misc]
             )
         self._id = env_name
         self._task = ids[env_name]
-        self._given = {"task": self._task}
+        self._given: dict[str, Any] = {"task": self._task}
+        if readings:
+            self._given["readings"] = [*readings]
         self._env = TaskEnv(
-            self._task, seed=seed, first_episode=first_episode, normalise=False
+            self._task, seed=seed, first_episode=first_episode, readings=readings, normalise=False
         )
         self._observation: dict[str, np.ndarray] = {}
         self._reward, self._done, self._success = 0.0, False, False

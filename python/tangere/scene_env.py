@@ -30,6 +30,7 @@ from numpy.typing import NDArray
 from . import _core
 from ._arrays import is_picture, numbers, singles
 from ._rendering import MODES, RenderMode, Rendering
+from ._row_readings import RowReadings
 from ._vector_env import AUTORESET, Autoreset, EpisodesEnv, Observation
 from ._vector_env import check_choices, checked_seed, final_info, system_seed
 from .gym import SingleEnv
@@ -45,7 +46,9 @@ class VectorSceneEnv(EpisodesEnv):
     (numbers of an action; None: those of the controls), `action_low` and `action_high` (one number,
     or one per number of an action; actions are clipped to them), `warm_up` (whether an episode
     begins with an action of zeros, which does not count: the first observation is of the state
-    after it). For data sets alone: `units` (KEY → unit of an observation, "action" → that of the
+    after it), `readings` (of sensors, shown beside what `observe` returns and named as in `tangere
+    generate --record`: "pad.sum", or "pad/5" for a window (E, n, …) of all readings since the row
+    before, 5 steps apart). For data sets alone: `units` (KEY → unit of an observation, "action" → that of the
     actions), `privileged` (KEYs that a robot could not measure), `touch` (KEYs whose numbers are
     all 0 without contact). `arrays`: "torch" where the methods compute with tensors, for
     `tangere.torch.EnvTape`; `batch` returns tensors then.
@@ -81,6 +84,7 @@ class VectorSceneEnv(EpisodesEnv):
     action_low: float | Sequence[float] = -1.0
     action_high: float | Sequence[float] = 1.0
     warm_up: bool = False
+    readings: Sequence[str] = ()
     units: dict[str, str] = {}
     privileged: Sequence[str] = ()
     touch: Sequence[str] = ()
@@ -122,6 +126,8 @@ class VectorSceneEnv(EpisodesEnv):
                 continue
             if not isinstance(value, (int, np.integer)) or value < 1:
                 raise self._fault(f"{name} {value!r}", "a whole number from 1 on")
+        sensors = [sensor.name for sensor in self.model.sensors]
+        self._readings = RowReadings(self.readings, sensors, self.steps_per_action, self._fault)
         self.metadata = {
             "autoreset_mode": AUTORESET[autoreset],
             "render_modes": [*MODES],
@@ -177,8 +183,9 @@ class VectorSceneEnv(EpisodesEnv):
     def simulate(self, controls: Any, envs: Indices) -> None:
         """Takes the steps of an action of the environments `envs` with the controls
         (steps_per_action, E, nu), as `batch.run` does. A task that reads something within an action
-        takes them itself, with `every` and `fields`, and keeps the rows of `envs`."""
-        self.batch.run(controls, every=len(controls), envs=envs)
+        takes them itself, with `every` and `fields`, and keeps the rows of `envs`. With windows in
+        `readings` it calls this method."""
+        self._readings.run(self.batch, controls, envs)
 
     def reward(self, actions: NDArray[np.float64]) -> Any:
         """(E) after the actions (E, na)."""
@@ -272,6 +279,11 @@ class VectorSceneEnv(EpisodesEnv):
         self._rendering.close()
 
     @property
+    def windows(self) -> dict[str, float]:
+        """KEY → time between the readings of a window [s], of those that `readings` names."""
+        return {key: n * self.model.timestep for key, n in self._readings.windows.items()}
+
+    @property
     def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """(na) each: least and largest actions."""
         return self._low, self._high
@@ -326,6 +338,7 @@ class VectorSceneEnv(EpisodesEnv):
             self.episodes[envs] = episodes
             self._batch.reset(envs, episodes.tolist())
             self._begin(envs)
+            self._readings.start(self.batch, envs)
             if self.warm_up and warm_up:
                 self._act(np.tile(self._zeros, (self.num_envs, 1)), envs)
 
@@ -334,7 +347,9 @@ class VectorSceneEnv(EpisodesEnv):
         controls = np.asarray(numbers(self.controls(self._given(actions))), np.float64)
         shape = self._shape_of_controls(controls)
         if len(envs):
+            self._readings.expect()
             self.simulate(self._given(np.array(np.broadcast_to(controls, shape))), envs)
+            self._readings.check()
 
     def _shape_of_controls(self, controls: Any) -> tuple[int, int, int]:
         """(steps_per_action, E, nu). Raises InputError where controls() returned another shape."""
@@ -360,6 +375,10 @@ class VectorSceneEnv(EpisodesEnv):
         seen = self.observe()
         if not isinstance(seen, dict) or not seen:
             raise self._fault(f"observe() {type(seen).__name__}", "a dict KEY → (E, …)")
+        if self._readings.between:
+            for key in seen.keys() & self._readings.between.keys():
+                raise self._fault(f"observe()[{key!r}], which is in `readings`", "it in one of both")
+            seen = seen | self._readings.rows(self.batch)
         given = {k: numbers(a) for k, a in seen.items()}
         arrays = {k: a.copy() if is_picture(a) else singles(a) for k, a in given.items()}
         for key, array in arrays.items():

@@ -109,17 +109,6 @@ std::span<double> BlockWorker::part(std::vector<double>& snapshots, std::size_t 
   return std::span(snapshots).subspan((moment * kBlock + as_size(lane)) * width, width);
 }
 
-void BlockWorker::act(Batch& batch, Stepper& stepper, EnvironmentData& data, int block,
-                      std::span<const double> actions, VectorCounts& counts) {
-  begin(batch, data, block, actions);
-  for (int k = 0; k < task_.spec().steps_per_action; ++k) {
-    compute_controls(batch, data, block, k);
-    stepper.step_block(batch, block, data.u);
-    record_snapshot(batch, block, k, counts);
-  }
-  conclude(batch, data, block, counts);
-}
-
 void BlockWorker::begin(Batch& batch, EnvironmentData& data, int block,
                         std::span<const double> actions) {
   const int first = block * kBlock, last = std::min(first + kBlock, batch.environments());

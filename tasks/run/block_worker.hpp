@@ -46,12 +46,10 @@ class BlockWorker {
  public:
   BlockWorker(const Task& task, Precision precision);
 
-  /// `actions`: (E, action); empty if every environment of the block starts.
-  void act(Batch& batch, Stepper& stepper, EnvironmentData& data, int block,
-           std::span<const double> actions, VectorCounts& counts);
+  // The caller steps the batch. An action is: begin; for every step k compute_controls, step,
+  // record_snapshot; then conclude.
 
-  // The parts of act(), for callers that step the batch themselves: begin; for every step k
-  // compute_controls, step, record_snapshot; then conclude.
+  /// `actions`: (E, action); empty if every environment of the block starts.
   void begin(Batch& batch, EnvironmentData& data, int block, std::span<const double> actions);
   /// Writes the controls for step k into data.u.
   void compute_controls(const Batch& batch, EnvironmentData& data, int block, int step) const;

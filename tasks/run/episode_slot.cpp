@@ -190,11 +190,10 @@ void EpisodeSlot<T>::observe_reading(std::size_t name, int row) {
 /// Reads what is due after a step, which counts from the start of the episodes.
 template <class T>
 void EpisodeSlot<T>::read_windows(std::int64_t step) {
-  const auto after = static_cast<int>(step % source_.steps_per_row) + 1;  // the row before
-  for (std::size_t name = 0; name < windows_.size(); ++name) {
-    const int between = source_.steps_per_row / source_.channels[name].window;
-    if (after % between == 0) read_window(name, as_size(after / between - 1));
-  }
+  const auto in_row = static_cast<int>(step % source_.steps_per_row);
+  for (std::size_t name = 0; name < windows_.size(); ++name)
+    if (const auto place = source_.channels[name].window_place(in_row, source_.steps_per_row))
+      read_window(name, *place);
 }
 
 /// Reads a channel with a window into a place of it; of another channel nothing.

@@ -9,6 +9,7 @@
 
 #include "tasks/run/block_threads.hpp"
 #include "tasks/run/block_worker.hpp"
+#include "tasks/run/row_readings.hpp"
 
 namespace tangere {
 
@@ -17,6 +18,7 @@ struct VectorTask::Impl {
   struct Worker {
     BlockWorker block;
     Stepper stepper;
+    RowReadings::Reader reader;
   };
 
   Impl(const Task& t, int environments, const VectorOptions& o)
@@ -24,10 +26,12 @@ struct VectorTask::Impl {
         options(o),
         data(t, environments),
         batch(t.model(), environments, o.seed, o.first_episode),
+        readings(t, o.readings, environments),
         threads(o.threads) {
     workers.reserve(static_cast<std::size_t>(o.threads));
     for (int i = 0; i < o.threads; ++i)
-      workers.push_back({BlockWorker(t, o.precision), Stepper(t.model())});
+      workers.push_back({BlockWorker(t, o.precision), Stepper(t.model()),
+                         RowReadings::Reader(readings, t.model(), o.precision)});
     tallies.resize(static_cast<std::size_t>(batch.blocks()));
   }
 
@@ -71,16 +75,28 @@ struct VectorTask::Impl {
   }
 
   void step_blocks(std::span<const double> actions) {
-    threads.for_each(batch.blocks(), workers, [&](Worker& worker, int block) {
-      worker.block.act(batch, worker.stepper, data, block, actions,
-                       tallies[static_cast<std::size_t>(block)]);
-    });
+    threads.for_each(batch.blocks(), workers,
+                     [&](Worker& worker, int block) { act(worker, block, actions); });
+  }
+
+  /// `actions`: empty if every environment of the block starts.
+  void act(Worker& worker, int block, std::span<const double> actions) {
+    VectorCounts& counts = tallies[static_cast<std::size_t>(block)];
+    worker.block.begin(batch, data, block, actions);
+    for (int k = 0; k < task.spec().steps_per_action; ++k) {
+      worker.block.compute_controls(batch, data, block, k);
+      worker.stepper.step_block(batch, block, data.u);
+      worker.block.record_snapshot(batch, block, k, counts);
+      if (!readings.channels().empty()) readings.read(worker.reader, batch, data, block, k);
+    }
+    worker.block.conclude(batch, data, block, counts);
   }
 
   const Task& task;
   VectorOptions options;
   EnvironmentData data;
   Batch batch;
+  RowReadings readings;
   std::vector<Worker> workers;        // by the thread's index in the arena
   std::vector<VectorCounts> tallies;  // per block
   BlockThreads threads;
@@ -138,18 +154,20 @@ TaskView VectorTask::view(int environment) const {
 }
 const Batch& VectorTask::batch() const { return impl_->batch; }
 
+const std::vector<EpisodeChannel>& VectorTask::readings() const {
+  return impl_->readings.channels();
+}
+std::span<const float> VectorTask::reading(std::size_t k) const {
+  return impl_->readings.numbers(k);
+}
+std::span<const std::uint8_t> VectorTask::colours(std::size_t k) const {
+  return impl_->readings.bytes(k);
+}
+
 VectorCounts VectorTask::counts() const {
   VectorCounts sum;
   for (const VectorCounts& tally : impl_->tallies) sum += tally;
   return sum;
-}
-
-double VectorTask::bytes(const Task& task, int environments, int threads) {
-  const double state = static_cast<double>(task.model().state_bytes_per_environment() +
-                                           Stepper::candidate_bytes(task.model()));
-  return environments * (state + EnvironmentData::bytes(task)) +
-         threads * (BlockWorker::bytes(task) +
-                    static_cast<double>(Stepper::workspace_bytes(task.model())));
 }
 
 }  // namespace tangere

@@ -7,8 +7,10 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <vector>
 
 #include "engine/base/precision.hpp"
+#include "engine/rows/episode_channels.hpp"
 #include "engine/step/stepper.hpp"
 #include "tasks/catalogue/task.hpp"
 #include "tasks/run/step_counts.hpp"
@@ -23,6 +25,9 @@ struct VectorOptions {
   /// Whether an environment starts another episode after its end. If not, it keeps its last state
   /// and shows it again.
   bool autoreset = true;
+  /// Readings of sensors beside what the task observes: "pad.sum" at every row, "pad" with times of
+  /// n steps as a window of K / n readings, K steps of an action (docs/outputs.md).
+  std::vector<TimedName> readings = {};
 };
 
 /// Environment e plays episodes first + e, first + e + E, first + e + 2 E … An episode depends only
@@ -30,7 +35,7 @@ struct VectorOptions {
 class VectorTask {
  public:
   /// Makes E environments and resets them. `task` must outlive this object. Throws InputError when
-  /// E or threads is below 1.
+  /// E or threads is below 1, and for readings that the scene does not have or that are no window.
   VectorTask(const Task& task, int environments, const VectorOptions& options = {});
   ~VectorTask();
   VectorTask(VectorTask&&) noexcept;
@@ -74,11 +79,13 @@ class VectorTask {
   [[nodiscard]] TaskView view(int environment) const;
   /// Of the steps since the last reset(seed), over all environments.
   [[nodiscard]] VectorCounts counts() const;
+  /// What options.readings names, in the order of data sets.
+  [[nodiscard]] const std::vector<EpisodeChannel>& readings() const;
+  /// Views, (E, numbers of a row), of the last reset or step; empty where the other one has them.
+  [[nodiscard]] std::span<const float> reading(std::size_t k) const;         ///< in SI units
+  [[nodiscard]] std::span<const std::uint8_t> colours(std::size_t k) const;  ///< 0 to 255
   /// The states themselves.
   [[nodiscard]] const Batch& batch() const;
-
-  /// Size of a VectorTask [bytes].
-  static double bytes(const Task& task, int environments, int threads);
 
  private:
   struct Impl;

@@ -53,6 +53,21 @@ TEST(LearnerNotes, NameTheEnvironment) {
     EXPECT_TRUE(spec.at(key).is_null()) << key;
 }
 
+TEST(LearnerNotes, NameTheReadingsThatTheEnvironmentShows) {
+  DatasetLayout l = of_task();
+  EXPECT_THAT(readings_in(robomimic_environment(l)), ::testing::IsEmpty());
+  const std::string sensor = l.sensors.front().name;
+  l.every = 20;
+  l.record = {{"q"}, {"goal"}, {sensor + ".sum", {5}}, {sensor + ".shear"}};
+  const std::vector<std::string> words{sensor + ".shear", sensor + ".sum/5"};
+  EXPECT_EQ(json::parse(robomimic_environment(l)).at("env_kwargs").at("readings"), json(words));
+  EXPECT_EQ(readings_in(robomimic_environment(l)), words);
+  EXPECT_EQ(json::parse(gymnasium_environment("box_pushing", "", words)).at("kwargs"),
+            json({{"task", "box_pushing"}, {"normalise", false}, {"readings", words}}));
+  for (const char* text : {"{", "3", R"({"env_kwargs":{"readings":3}})", R"({"env_kwargs":[]})"})
+    EXPECT_THAT(readings_in(text), ::testing::IsEmpty()) << text;
+}
+
 TEST(LearnerNotes, NameTheClassOfATaskInPython) {
   DatasetLayout l = of_task();
   l.task->name = "Lift";
