@@ -6,13 +6,16 @@
     data/SIDE_tactile_data_GROUP        (T, N, *shape)    float32 [N] of a field, uint8 of a picture
     data/SIDE_tactile_area_GROUP        (T, N)            int64: 0, 1 … of the pads
     data/SIDE_tactile_sensor_GROUP      (T)               the sensor's name
-    data/SIDE_tactile_type_GROUP        (T)               "state" of a field, "image" of a picture
+    data/SIDE_tactile_type_GROUP        (T)               "image" of a picture, "matrix" of a field,
+                                                          "state" of a vector
     data/camera_main_rgb                (T, H, W, 3)      uint8, of the first camera
     data/SIDE_arm_joints                (T, joints)       float32 [rad, m], of the joints named
     data/action, data/reward            (T, na), (T)      of Tangere; the loader makes its own
     meta/episode_ends                   (episodes)        int64
 
-A group is a reading of sensors, with dots as underlines.
+A group is a reading of sensors, with dots as underlines. The type chooses the encoder of FTP-1: a
+matrix has two or three axes behind N, a state one. So a window of n readings has no axis: its n
+readings are one after the other on the last axis, (…, n c), the newest last.
 """
 
 from __future__ import annotations
@@ -58,8 +61,8 @@ class Ftp1(ZarrStore):
             group = re.sub(r"\W", "_", key)
             start = f"{side}_tactile"
             first = frames.of(0)[key]
-            shape = (1, *first.shape[1:]) if picture else frames.pads_apart(key, first).shape[1:]
-            kind = "image" if picture else "state"
+            shape = (1, *first.shape[1:]) if picture else _samples(frames, key, first).shape[1:]
+            kind = _kind(picture, shape)
             self._groups[group] = key
             dtype = np.dtype(np.uint8 if picture else np.float32)
             columns |= {
@@ -114,19 +117,33 @@ class Ftp1(ZarrStore):
             rows = (
                 picture_rows(frames, key)[:, None]
                 if picture
-                else self.frames.pads_apart(key, frames[key])
+                else _samples(self.frames, key, frames[key])
             )
             found |= {
                 f"{self._start}_data_{group}": rows.astype(column.dtype, copy=False),
                 f"{self._start}_area_{group}": np.tile(np.arange(pads), (count, 1)),
                 f"{self._start}_sensor_{group}": np.full(count, self._sensor),
-                f"{self._start}_type_{group}": np.full(count, "image" if picture else "state"),
+                f"{self._start}_type_{group}": np.full(count, _kind(picture, column.shape)),
             }
         if self._joints:
             found[self._arm] = frames["q"][:, self._joints].astype(np.float32)
         if self._camera:
             found["camera_main_rgb"] = picture_rows(frames, self._camera)
         return found
+
+
+def _kind(picture: bool, shape: tuple[int, ...]) -> str:
+    """The type of a reading (N, …)."""
+    return "image" if picture else "matrix" if len(shape) > 2 else "state"
+
+
+def _samples(frames: Frames, key: str, rows: np.ndarray) -> np.ndarray:
+    """A reading of frames as (t, N, *shape), a window on the last axis of the shape."""
+    apart = frames.pads_apart(key, rows)
+    if key not in frames.windows:
+        return apart
+    apart = np.moveaxis(apart, 2, -2)
+    return apart.reshape(*apart.shape[:-2], -1)
 
 
 def joint_places(frames: Frames, joints: str | None) -> list[int]:

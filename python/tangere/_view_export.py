@@ -116,7 +116,10 @@ def _zarr(path: Path, said: dict[str, Any]) -> _Export:
                 continue
             rows = np.asarray(array[part])
             rows = rows[:, 0] if name in ftp1 else rows  # the one pad
-            rows = rows[:, -1] if "window" in array.attrs else rows
+            if "window" in array.attrs and name in ftp1:
+                rows = rows[..., -(rows.shape[-1] // array.attrs["window"]["readings"]) :]
+            elif "window" in array.attrs:
+                rows = rows[:, -1]
             found["rewards" if name == "reward" else key] = rows
         return found
 

@@ -55,7 +55,7 @@ def observation_space(
         scale = np.broadcast_to(np.asarray(observation_scale(tensor)), tensor.shape)
         by = scale if normalise else np.ones(tensor.shape)
         low, high = tensor.low / by, tensor.high / by
-        kind = np.uint8 if tensor.own_bytes == 1 else np.float32
+        kind: Any = np.uint8 if tensor.own_bytes == 1 else np.float32
         box = spaces.Box(low.astype(kind), high.astype(kind), dtype=kind)
         boxes[tensor.name] = box
         parts.append(box)

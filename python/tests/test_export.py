@@ -85,7 +85,7 @@ def test_ftp1_has_its_tactile_keys(presses, tmp_path):
     assert field.shape[:2] == (count, 1) and field.attrs["unit"] == "N"
     picture = data["right_tactile_data_gel_rgb"]
     np.testing.assert_array_equal(picture[:, 0], stored(presses, "obs/gel.rgb"))
-    for group, kind in (("gel", "state"), ("gel_rgb", "image"), ("gel_markers", "state")):
+    for group, kind in (("gel", "matrix"), ("gel_rgb", "image"), ("gel_markers", "matrix")):
         assert (data[f"right_tactile_area_{group}"][:] == [[0]]).all()
         assert set(data[f"right_tactile_sensor_{group}"][:]) == {"GelSightMini"}
         assert set(data[f"right_tactile_type_{group}"][:]) == {kind}

@@ -72,7 +72,11 @@ def test_formats_have_every_reading(pushes_with_touch, tmp_path):
     assert "`pad`, `pad.sum`: 5 samples a frame along the first axis, 0.005 s apart" in card
     exports.export(data, tmp_path / "ftp1", "ftp1")
     group = zarr.open_group(str(tmp_path / "ftp1/data"), mode="r")["right_tactile_data_pad"]
-    np.testing.assert_array_equal(group[:], pad[:, None])
+    np.testing.assert_array_equal(group[:], np.concatenate([*np.moveaxis(pad, 1, 0)], -1)[:, None])
+    said = {name: zarr.open_group(str(tmp_path / "ftp1/data"))[f"right_tactile_{name}"][0]
+            for name in ("type_pad", "type_pad_sum", "data_pad_sum")}  # fmt: skip
+    assert said["type_pad"] == "matrix" and said["type_pad_sum"] == "state"
+    np.testing.assert_array_equal(said["data_pad_sum"][0], stored(data, "obs/pad.sum")[0].ravel())
     with pytest.raises(tangere.InputError, match="touch 'image' of .*pad.* with a window of 5"):
         exports.export(data, tmp_path / "none", touch="image")
 
