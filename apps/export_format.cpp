@@ -89,6 +89,7 @@ Words words_of(const FormatOptions& options) {
   add_words(words, "--fps", options.fps);
   add_words(words, "--license", options.license);
   add_words(words, "--joints", options.joints);
+  add_words(words, "--hand", options.hand);
   add_words(words, "--side", options.side);
   add_words(words, "--sensor", options.sensor);
   return words;
@@ -124,6 +125,10 @@ void add_format_options(CLI::App& app, FormatOptions& o) {
   add_text(app, "--license", o.license, "NAME", "lerobot: of the data, named in README.md");
   add_text(app, "--joints", o.joints, "NAMES",
            "ftp1, univtac: coordinates of the arm, as q_names has them, with commas");
+  add_text(
+      app, "--hand", o.hand, "NAME=SLOT",
+      "ftp1: coordinates of the hand with FTP-1's numbers of joints, with commas; one alone is "
+      "a gripper, 28");
   add_text(app, "--side", o.side, "SIDE",
            "ftp1: hand that carries the sensors, left or right [default: right]");
   add_text(app, "--sensor", o.sensor, "NAME",

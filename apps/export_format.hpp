@@ -19,7 +19,7 @@ namespace tangere::apps {
 
 /// Options of formats. Text is empty and numbers are absent if an option is not given.
 struct FormatOptions {
-  std::string to, mask, touch, pictures, task, license, joints, side, sensor;
+  std::string to, mask, touch, pictures, task, license, joints, hand, side, sensor;
   bool only_success = false, resume = false, privileged = false;
   std::optional<std::int64_t> window, workers, fps;
 

@@ -10,6 +10,8 @@
                                                           "state" of a vector
     data/camera_main_rgb                (T, H, W, 3)      uint8, of the first camera
     data/SIDE_arm_joints                (T, joints)       float32 [rad, m], of the joints named
+    data/SIDE_hand_joints               (T, joints)       float32 [rad, m], of the hand
+    data/SIDE_hand_joints_idx           (T, joints)       int32, which joint of FTP-1's hand each is
     data/action, data/reward            (T, na), (T)      of Tangere; the loader makes its own
     meta/episode_ends                   (episodes)        int64
 
@@ -31,18 +33,22 @@ from ._export_zarr import Column, ZarrStore, attributes_of
 from ._lerobot_format import task_text
 
 _AREA = np.dtype(np.int64)
+_ARM_JOINTS = 7  # at most
+_HAND_JOINTS = 32  # numbers of joints
+_GRIPPER = 28  # that of the opening of a gripper
 
 
 class Ftp1(ZarrStore):
     """The format.
 
     side: of the hand that carries the sensors. sensor: their name in the data. joints: coordinates
-    of the arm with commas, of `q_names`. task: the text; None: the task's name and its success.
+    of the arm with commas, of `q_names`. hand: those of the hand with numbers of FTP-1's joints,
+    "thumb=1,index=6"; one alone is a gripper, 28. task: the text; None: the task's name and its success.
     """
 
     def __init__(
         self, frames: Frames, side: str = "right", sensor: str = "tangere",
-        joints: str | None = None, task: str | None = None,
+        joints: str | None = None, hand: str | None = None, task: str | None = None,
     ):  # fmt: skip
         episodes = frames.episodes
         if side not in ("left", "right"):
@@ -77,6 +83,19 @@ class Ftp1(ZarrStore):
                 f"{episodes.keys}"
             )
         self._start, self._joints = f"{side}_tactile", joint_places(frames, joints)
+        if len(self._joints) > _ARM_JOINTS:
+            raise _core.InputError(f"{len(self._joints)} joints; expected {_ARM_JOINTS} at most")
+        self._hand_key, self._slots = f"{side}_hand_joints", hand_slots(hand)
+        self._hand = joint_places(frames, ",".join(self._slots))
+        shape = (len(self._hand),)
+        if self._hand:
+            columns[self._hand_key] = Column(
+                shape, np.dtype(np.float32), {"names": [*self._slots]}
+            )
+            columns[f"{self._hand_key}_idx"] = Column(shape, np.dtype(np.int32), {})
+        self.notes = [] if self._hand else [
+            "FTP-1's loader reads the touch of a hand with joints alone; see --hand"
+        ]  # fmt: skip
         if self._joints:
             names = {"names": joints.split(",") if joints else []}
             columns[f"{side}_arm_joints"] = Column(
@@ -96,7 +115,8 @@ class Ftp1(ZarrStore):
         super().__init__(frames, columns)
 
     def job(self) -> dict[str, Any]:
-        said = {"text": self._text, "sensor": self._sensor, "joints": self._joints}
+        said = {"text": self._text, "sensor": self._sensor, "joints": self._joints,
+                "hand": self._slots}  # fmt: skip
         return super().job() | said
 
     def arrays(self, frames: Arrays, start: int) -> Arrays:
@@ -127,6 +147,9 @@ class Ftp1(ZarrStore):
             }
         if self._joints:
             found[self._arm] = frames["q"][:, self._joints].astype(np.float32)
+        if self._hand:
+            found[self._hand_key] = frames["q"][:, self._hand].astype(np.float32)
+            found[f"{self._hand_key}_idx"] = np.tile([*self._slots.values()], (count, 1))
         if self._camera:
             found["camera_main_rgb"] = picture_rows(frames, self._camera)
         return found
@@ -144,6 +167,24 @@ def _samples(frames: Frames, key: str, rows: np.ndarray) -> np.ndarray:
         return apart
     apart = np.moveaxis(apart, 2, -2)
     return apart.reshape(*apart.shape[:-2], -1)
+
+
+def hand_slots(hand: str | None) -> dict[str, int]:
+    """Coordinate → number of FTP-1's joint, of "thumb=1,index=6"."""
+    slots: dict[str, int] = {}
+    words = hand.split(",") if hand else []
+    for word in words:
+        name, equals, number = word.rpartition("=")
+        if not equals and len(words) == 1:
+            name, number = word, str(_GRIPPER)
+        fits = number.isdecimal() and int(number) < _HAND_JOINTS
+        if not name or not fits or name in slots or int(number) in slots.values():
+            raise _core.InputError(
+                f"hand {word!r}; expected NAME=NUMBER, each once, the number of a joint from 0 to "
+                f"{_HAND_JOINTS - 1}"
+            )
+        slots[name] = int(number)
+    return slots
 
 
 def joint_places(frames: Frames, joints: str | None) -> list[int]:

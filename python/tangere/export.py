@@ -240,6 +240,10 @@ def _add_format_options(parser: argparse.ArgumentParser) -> list[str]:
     group.add_argument(
         "--joints", metavar="NAMES", help="ftp1, univtac: coordinates of the arm, with commas"
     )
+    group.add_argument(
+        "--hand", metavar="NAME=SLOT",
+        help="ftp1: coordinates of the hand with FTP-1's numbers of joints, with commas",
+    )  # fmt: skip
     group.add_argument("--side", choices=["left", "right"], help="ftp1: hand with the sensors")
     group.add_argument("--sensor", metavar="NAME", help="ftp1: the sensor's name in the data")
     return [action.dest for action in parser._actions if action.dest not in before]

@@ -76,8 +76,9 @@ def test_zarr_has_every_number(pushes, tmp_path):
 
 
 def test_ftp1_has_its_tactile_keys(presses, tmp_path):
-    options = {"joints": "hand.x,hand.z", "task": "press the gel", "sensor": "GelSightMini"}
-    exports.export(presses, tmp_path / "out", "ftp1", **options)
+    options = {"joints": "hand.x,hand.z", "task": "press the gel", "sensor": "GelSightMini",
+               "hand": "hand.y=6,hand.x=1"}  # fmt: skip
+    assert not exports.export(presses, tmp_path / "out", "ftp1", **options).notes
     data = zarr.open_group(str(tmp_path / "out/data"), mode="r")
     count = len(stored(presses, "actions"))
     field = data["right_tactile_data_gel"]
@@ -91,6 +92,9 @@ def test_ftp1_has_its_tactile_keys(presses, tmp_path):
         assert set(data[f"right_tactile_type_{group}"][:]) == {kind}
     q = stored(presses, "obs/q")
     np.testing.assert_array_equal(data["right_arm_joints"][:], q[:, [0, 2]])
+    np.testing.assert_array_equal(data["right_hand_joints"][:], q[:, [1, 0]])
+    index = data["right_hand_joints_idx"]
+    assert index.dtype == np.int32 and (index[:] == [6, 1]).all() and index.shape == (count, 2)
     assert set(data["sub_task_instruction"][:]) == {"press the gel"}
     stamps = data["timestamps"][:]
     assert (stamps[:: count // 3] == 0).all() and stamps.max() == count // 3 - 1
@@ -98,7 +102,8 @@ def test_ftp1_has_its_tactile_keys(presses, tmp_path):
 
 def test_ftp1_tells_pads_apart(generate, tmp_path):
     grasps = generate("stable_grasp", "--episodes", "2", "--seed", "3")
-    exports.export(grasps, tmp_path / "out", "ftp1", side="left")
+    done = exports.export(grasps, tmp_path / "out", "ftp1", side="left")
+    assert done.notes == ["FTP-1's loader reads the touch of a hand with joints alone; see --hand"]
     data = zarr.open_group(str(tmp_path / "out/data"), mode="r")
     flow = stored(grasps, "obs/flow")  # (n, 4, 13, 10): pad, component
     pads = data["left_tactile_data_flow"][:]
@@ -344,6 +349,9 @@ def test_what_a_format_does_not_have_is_told(pushes, generate, tmp_path):
         (pushes, "zarr", {"fps": 3}, "zarr has no option 'fps'; it has privileged"),
         (pushes, "csv", {"mask": "train"}, "csv has no option 'mask'"),
         (pushes, "ftp1", {"joints": "elbow"}, "joints 'elbow'; expected names of q: hand_turn"),
+        (pushes, "ftp1", {"hand": "elbow"}, "joints 'elbow'; expected names of q: hand_turn"),
+        (pushes, "ftp1", {"hand": "hand_turn=32"}, "hand 'hand_turn=32'; expected NAME=NUMBER"),
+        (pushes, "ftp1", {"hand": "hand_turn=1,box.x"}, "hand 'box.x'; expected NAME=NUMBER"),
         (pushes, "ftp1", {"side": "top"}, "side 'top'; expected left or right"),
         (pushes, "zarr", {"workers": 0}, "workers 0"),
         (bare, "ftp1", {}, "no reading of a sensor for FTP-1"),
