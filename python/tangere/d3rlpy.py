@@ -20,7 +20,7 @@ from d3rlpy.dataset import Episode, InfiniteBuffer, ReplayBuffer
 
 from . import _core, gym
 from ._closed_loop import TEST_SEED, play_episodes
-from .data import Episodes
+from .data import Episodes, _none_left
 from .scene_env import VectorSceneEnv
 
 __all__ = ["play", "replay_buffer"]
@@ -60,7 +60,7 @@ def replay_buffer(
             )
         )
     if not stored:
-        raise _core.InputError(f"{episodes.path}: no episode is left to learn from")
+        raise _none_left(episodes, mask, False, "learn from")
     return ReplayBuffer(InfiniteBuffer(), episodes=stored)
 
 

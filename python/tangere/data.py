@@ -293,6 +293,16 @@ def _kept(rows: np.ndarray) -> type:
     return np.uint8 if rows.dtype == np.uint8 and rows.ndim == 4 else np.float32
 
 
+def _none_left(
+    episodes: Episodes, mask: str | None, only_success: bool, purpose: str
+) -> _core.InputError:
+    """An error that says which episodes were to be there for a purpose."""
+    wanted = f"mask {mask!r}" if mask is not None else "all"
+    if only_success:
+        wanted += ", those that succeeded"
+    return _core.InputError(f"{episodes.path}: no episode is left to {purpose} of {wanted}")
+
+
 class Windows:
     """Windows of rows of a data set, with the interface of `torch.utils.data.Dataset`.
 
@@ -357,7 +367,7 @@ class Windows:
             chosen = [i for i in chosen if i in solved]
         self.chosen = np.asarray([i for i in chosen if self.episodes.lengths[i] > 0], int)
         if len(self.chosen) == 0:
-            raise _core.InputError(f"{self.episodes.path}: no episode is left to learn from")
+            raise _none_left(self.episodes, split, only_success, "learn from")
         self._ends = np.cumsum(self.episodes.lengths[self.chosen])
         self._statistics: dict[str, tuple[np.ndarray, np.ndarray]] = {}
         self._flat: dict[str, np.ndarray | None] = {}  # by name; None: too large for memory

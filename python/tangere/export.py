@@ -28,7 +28,7 @@ from typing import Any, Callable, Literal, Sequence, get_args
 from . import _core, _export_job
 from ._export_frames import Frames
 from ._generate import run_command
-from .data import Episodes
+from .data import Episodes, _none_left
 
 __all__ = ["Exported", "export", "main"]
 
@@ -131,10 +131,7 @@ def _chosen(episodes: Episodes, mask: str | None, only_success: bool) -> list[in
     solved = set(episodes.succeeded()) if only_success else set()
     chosen = [i for i in chosen if episodes.lengths[i] and (i in solved or not only_success)]
     if not chosen:
-        wanted = f"mask {mask!r}" if mask is not None else "all"
-        if only_success:
-            wanted += ", those that succeeded"
-        raise _core.InputError(f"{episodes.path}: no episode is left to write of {wanted}")
+        raise _none_left(episodes, mask, only_success, "write")
     return chosen
 
 

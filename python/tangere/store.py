@@ -175,10 +175,11 @@ def generate(
     words = ["generate", str(what), "--episodes", str(episodes), "--seed", str(seed), *options]
     with tempfile.TemporaryDirectory(dir=scratch, prefix="tangere-") as folder:  # refuses mistakes
         run_command([*words, "--output", folder, "--shards", str(shards), "--dry-run", "--quiet"])
-    _agree(place, str(destination), {
+    job = {
         "words": words, "shards": shards, "tangere_version": __version__,
         "instruction_set": _core.instruction_set,
-    })  # fmt: skip
+    }  # fmt: skip
+    agreed = _agrees(place, str(destination), job)
     mine = range(index, shards, count)
     said = {"made": 0, "kept": 0, "process": index, "processes": count}
     with tempfile.TemporaryDirectory(dir=scratch, prefix="tangere-") as folder:
@@ -194,6 +195,9 @@ def generate(
                 *words, "--output", folder, "--shard", f"{shard}/{shards}", "--no-merge", "--quiet",
                 "--resume",
             ])  # fmt: skip
+            if not agreed:  # no sooner, so that what is refused leaves nothing there
+                _claim(place, str(destination), job)
+                agreed = True
             path = Path(folder) / name
             _move(place, path, put)
             path.unlink()
@@ -256,16 +260,24 @@ def _keep_job(folder: Path, job: bytes, destination: str) -> None:
     new.replace(mine)
 
 
-def _agree(place: Place, name: str, job: dict[str, Any]) -> None:
-    """Writes what the shards are, or compares it."""
-    if _JOB in place.sizes():
-        there = json.loads(place.read(_JOB))
-        for key, value in job.items():
-            if there.get(key) != value:
-                raise _core.InputError(
-                    f"{name} has shards of {key} {there.get(key)!r}; expected {value!r}, or "
-                    "another destination"
-                )
+def _agrees(place: Place, name: str, job: dict[str, Any]) -> bool:
+    """Whether a destination says that its shards are these. Raises InputError if they are others,
+    and is false if it says nothing yet."""
+    if _JOB not in place.sizes():
+        return False
+    there = json.loads(place.read(_JOB))
+    for key, value in job.items():
+        if there.get(key) != value:
+            raise _core.InputError(
+                f"{name} has shards of {key} {there.get(key)!r}; expected {value!r}, or "
+                "another destination"
+            )
+    return True
+
+
+def _claim(place: Place, name: str, job: dict[str, Any]) -> None:
+    """Says at a destination what its shards are, unless another process has."""
+    if _agrees(place, name, job):
         return
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / _JOB

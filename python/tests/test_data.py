@@ -221,3 +221,14 @@ def test_rows_in_which_something_is_felt(pushes, generate):
     assert blind.touch == []
     with pytest.raises(tangere.InputError, match="does not say where something is felt"):
         blind.felt()
+
+
+def test_an_empty_mask_is_named(generate):
+    data = generate("box_pushing", "--episodes", "2", "--policy", "random")
+    for options, wanted in (
+        ({"split": "valid_success"}, "mask 'valid_success'"),
+        ({"split": "train", "only_success": True}, "mask 'train', those that succeeded"),
+        ({"split": None, "only_success": True}, "all, those that succeeded"),
+    ):
+        with pytest.raises(tangere.InputError, match=f"is left to learn from of {wanted}$"):
+            Windows(data, **options)

@@ -57,6 +57,7 @@ def test_other_settings_and_mistakes_are_told(tmp_path):
         (("stable_grasp", there, 0, 1), {}, "episodes 0"),
         (("stable_grasp", there, 16, 1), {"options": "--quiet"}, "expected a list"),
         (("no_task", tmp_path / "none", 16, 1), {}, "no_task"),
+        (("stable_grasp", tmp_path / "none", 16, 1), {"options": ["--overwrite"]}, "overwrite"),
     ):
         with pytest.raises((tangere.InputError, tangere.IoError), match=message):
             store.generate(*arguments, **options)
