@@ -20,8 +20,8 @@ std::string environment_id(const std::string& task);
 std::string robomimic_environment(const DatasetLayout& layout);
 
 /// `env_spec` of Minari: Gymnasium's EnvSpec of a task whose observations are those of the files,
-/// in SI units. `python_class`: DatasetLayout::python_class. `readings`: those of readings_in() that
-/// the environment shows beside them.
+/// in SI units. `python_class`: DatasetLayout::python_class. `readings`: those of readings_in()
+/// that the environment shows beside them.
 std::string gymnasium_environment(const std::string& task, const std::string& python_class = "",
                                   const std::vector<std::string>& readings = {});
 

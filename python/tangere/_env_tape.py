@@ -72,7 +72,8 @@ class EnvTape:
                 raise _core.InputError(f"{name} of a tape; expected it in reset()")
         if task.readings:
             raise _core.InputError(
-                f"{task.__name__}: readings {[*task.readings]} of a tape; expected them in observe()"
+                f"{task.__name__}: readings {[*task.readings]} of a tape; expected them in "
+                "observe()"
             )
         self.env = task(num_envs, threads=threads, seed=0, **arguments)
         self.num_envs, self.flatten, self.dtype = num_envs, flatten, dtype

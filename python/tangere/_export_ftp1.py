@@ -43,7 +43,8 @@ class Ftp1(ZarrStore):
 
     side: of the hand that carries the sensors. sensor: their name in the data. joints: coordinates
     of the arm with commas, of `q_names`. hand: those of the hand with numbers of FTP-1's joints,
-    "thumb=1,index=6"; one alone is a gripper, 28. task: the text; None: the task's name and its success.
+    "thumb=1,index=6"; one alone is a gripper, 28. task: the text; None: the task's name
+    and its success.
     """
 
     def __init__(

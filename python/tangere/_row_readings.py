@@ -39,7 +39,8 @@ class RowReadings:
             if name in self.between:
                 raise fault(f"reading {name!r} twice", "it once")
             if slash and not (times.isdecimal() and 0 < int(times) < steps):
-                raise fault(f"reading {word!r}", f"{name!r}, or a window of less than {steps} steps")
+                expected = f"{name!r}, or a window of less than {steps} steps"
+                raise fault(f"reading {word!r}", expected)
             self.between[name] = int(times) if slash else steps
             if steps % self.between[name]:
                 raise fault(f"reading {word!r}", f"a divisor of {steps}, the steps of an action")
@@ -84,8 +85,8 @@ class RowReadings:
     def check(self) -> None:
         """Raises an error if nothing was read within the action."""
         if not self._taken:
-            raise self._fault("simulate() without the readings of the windows "
-                              f"{[*self.windows]}", "super().simulate(controls, envs) in it")  # fmt: skip
+            found = f"simulate() without the readings of the windows {[*self.windows]}"
+            raise self._fault(found, "super().simulate(controls, envs) in it")
 
     def rows(self, batch: Any) -> dict[str, Any]:
         """KEY → (E, …) at the present row."""

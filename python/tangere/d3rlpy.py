@@ -73,7 +73,8 @@ def play(
 
     task: a name of `tangere.task_names()`, or a class of `tangere.VectorSceneEnv`.
     keys: those of the replay buffer. readings: those of them that sensors give beside what the
-        task observes, as in `tangere.make_vec`: "pad.sum", "pad/1". seed: of the episodes; not that of the data set.
+        task observes, as in `tangere.make_vec`: "pad.sum", "pad/1".
+    seed: of the episodes; not that of the data set.
 
     Returns "task", "seed", "episodes", "successes", "success_rate", the bounds of its 95 % interval
     after Wilson in "interval", "mean_return" and "mean_actions".

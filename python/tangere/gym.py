@@ -139,7 +139,8 @@ class VectorTaskEnv(EpisodesEnv):
         self._arguments = arguments
         for argument, words in (("keys", keys), ("readings", readings)):
             if isinstance(words, str):
-                raise _core.InputError(f"{argument} {words!r}; expected a list, such as [{words!r}]")
+                expected = f"expected a list, such as [{words!r}]"
+                raise _core.InputError(f"{argument} {words!r}; {expected}")
         seed = system_seed() if seed is None else checked_seed(seed)
         check_choices(num_envs, autoreset)
         self.task = _core.task_spec(task)

@@ -48,8 +48,8 @@ class VectorSceneEnv(EpisodesEnv):
     begins with an action of zeros, which does not count: the first observation is of the state
     after it), `readings` (of sensors, shown beside what `observe` returns and named as in `tangere
     generate --record`: "pad.sum", or "pad/5" for a window (E, n, …) of all readings since the row
-    before, 5 steps apart). For data sets alone: `units` (KEY → unit of an observation, "action" → that of the
-    actions), `privileged` (KEYs that a robot could not measure), `touch` (KEYs whose numbers are
+    before, 5 steps apart). For data sets alone: `units` (KEY → unit of an observation, "action" →
+    that of the actions), `privileged` (KEYs that a robot could not measure), `touch` (KEYs whose numbers are
     all 0 without contact). `arrays`: "torch" where the methods compute with tensors, for
     `tangere.torch.EnvTape`; `batch` returns tensors then.
 
@@ -377,7 +377,8 @@ class VectorSceneEnv(EpisodesEnv):
             raise self._fault(f"observe() {type(seen).__name__}", "a dict KEY → (E, …)")
         if self._readings.between:
             for key in seen.keys() & self._readings.between.keys():
-                raise self._fault(f"observe()[{key!r}], which is in `readings`", "it in one of both")
+                found = f"observe()[{key!r}], which is in `readings`"
+                raise self._fault(found, "it in one of both")
             seen = seen | self._readings.rows(self.batch)
         given = {k: numbers(a) for k, a in seen.items()}
         arrays = {k: a.copy() if is_picture(a) else singles(a) for k, a in given.items()}

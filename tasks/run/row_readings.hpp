@@ -42,8 +42,8 @@ class RowReadings {
     return bytes_[reading];
   }
 
-  /// Reads what is due after step `step`, 0 to K - 1, of an action of a block. Those of environments
-  /// whose episode was over before the action stay as they are.
+  /// Reads what is due after step `step`, 0 to K - 1, of an action of a block. Readings of
+  /// environments whose episode was over before the action stay as they are.
   void read(Reader& reader, const Batch& batch, const EnvironmentData& data, int block, int step);
 
  private:
