@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One collection of many kinds of touch: the paper's five tasks, an egg in a hand, a mug and a gel.
+"""One collection of many kinds of touch: the paper's five tasks, an egg in a hand, meshes and gels.
 
     PYTHONPATH=build/release/python python examples/collection.py out/touch --episodes 10000
 
@@ -7,7 +7,7 @@ It makes a data set in OUT/NAME for each part of the list below, then OUT/README
 the same command again after a stop: complete shards stay. Processes of a scheduler share the work.
 `--to lerobot` also exports each part into OUT/NAME_lerobot.
 
-The scenes of the mug and of the gel are those that come with the program. Here bodies start at
+The scenes of the meshes and of the gels are those that come with the program. Here bodies start at
 random places, mass, friction and stiffness vary, skins have flaws, and cameras see them.
 """
 
@@ -45,16 +45,18 @@ PARTS = (
     Part("cap_opening", "cap_opening", 6, WIDER),
     Part("insertion", "insertion", 10, ("--mix", "random=0.2")),
     Part("in_hand", "in_hand", 4, ("--mix", "random=0.2")),
-    Part("touch_mug", "touch_mug.xml", 12,
-         ("--steps", "200", "--every", "2", "--record", "q,v,left_finger,right_finger,eye.rgb")),
+    *(Part(f"touch_{mesh}", f"touch_{mesh}.xml", 6,
+           ("--steps", "200", "--every", "2", "--record", "q,v,left_finger,right_finger,eye.rgb"))
+      for mesh in ("mug", "pebble")),
     *(Part(f"touch_gel_{kind}", f"touch_gel_{kind}.xml", 4,
            ("--steps", "300", "--every", "10", "--record", "q,v,gel,gel.markers,gel.rgb_marker"))
       for kind in ("soft", "usual", "hard")),
 )  # fmt: skip
 
-# A mesh that two skins with flaws grip and lift at random places, seen by a camera.
+# Meshes that two skins with flaws grip and lift at random places, seen by a camera.
+MESHES = {"mug": "mug.obj", "pebble": "pebble.obj"}
 MUG = (
-    ('filename="meshes/mug.obj"', 'filename="{meshes}/mug.obj"'),
+    ('filename="meshes/mug.obj"', 'filename="{meshes}/{mesh}"'),
     ('axis0="1 0 0" axis1="0 0 1" resolution="24 24"/>',
      'axis0="1 0 0" axis1="0 0 1" resolution="24 24">{flaws}</tactile>'),
     ('axis0="0 0 1" axis1="1 0 0" resolution="24 24"/>',
@@ -114,8 +116,10 @@ def changed(scene: str, pairs: tuple[tuple[str, str], ...], **words: str) -> str
 def write_scenes(folder: Path) -> None:
     """The scenes that are changed, beside the data sets."""
     meshes = tangere.scenes()["mug"].parent / "meshes"
-    mug = changed("mug", MUG, meshes=str(meshes), flaws=FLAWS)
-    scenes = {"touch_mug.xml": mug}
+    scenes = {
+        f"touch_{kind}.xml": changed("mug", MUG, meshes=str(meshes), mesh=mesh, flaws=FLAWS)
+        for kind, mesh in MESHES.items()
+    }
     for kind, (modulus, thickness, kn) in GELS.items():
         words = {"modulus": modulus, "thickness": thickness, "kn": kn}
         scenes[f"touch_gel_{kind}.xml"] = changed("gel_press", GEL, **words)

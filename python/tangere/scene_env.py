@@ -49,9 +49,9 @@ class VectorSceneEnv(EpisodesEnv):
     after it), `readings` (of sensors, shown beside what `observe` returns and named as in `tangere
     generate --record`: "pad.sum", or "pad/5" for a window (E, n, …) of all readings since the row
     before, 5 steps apart). For data sets alone: `units` (KEY → unit of an observation, "action" →
-    that of the actions), `privileged` (KEYs that a robot could not measure), `touch` (KEYs whose numbers are
-    all 0 without contact). `arrays`: "torch" where the methods compute with tensors, for
-    `tangere.torch.EnvTape`; `batch` returns tensors then.
+    that of the actions), `privileged` (KEYs that a robot could not measure), `touch` (KEYs whose
+    numbers are all 0 without contact). `arrays`: "torch" where the methods compute with tensors,
+    for `tangere.torch.EnvTape`; `batch` returns tensors then.
 
     Methods, for all environments at once: `reward` is obligatory; `observe`, `controls`,
     `simulate`, `terminated`, `success` and `restart` have defaults. They read `self.batch`

@@ -40,9 +40,14 @@ def test_all_parts_are_made_and_named_by_the_card(collection, command, tmp_path,
         assert len(data) == 1 and f"| {part.name} | 1 | {data.lengths[0]} |" in card
         assert f"{data.content:016x}" in card and data.command in card
     assert sum(part.share for part in collection.PARTS) == 100
-    mug = Episodes(tmp_path / "touch_mug")
-    assert np.abs(mug[0]["left_finger"]).max() > 0.02 and np.ptp(mug[0]["eye.rgb"]) > 50
-    assert {"body mug density", "tactile left_finger kn"} <= set(mug.attributes["randomized_names"])
+    fields = []
+    for mesh in collection.MESHES:
+        touched = Episodes(tmp_path / f"touch_{mesh}")
+        fields.append(touched[0]["left_finger"])
+        assert np.abs(fields[-1]).max() > 0.02 and np.ptp(touched[0]["eye.rgb"]) > 50
+        varied = set(touched.attributes["randomized_names"])
+        assert {"body mug density", "tactile left_finger kn"} <= varied
+    assert np.abs(fields[0] - fields[1]).max() > 0.02  # other surfaces
     forces = [
         np.abs(Episodes(tmp_path / f"touch_gel_{kind}")[0]["gel"]).max()
         for kind in collection.GELS
