@@ -133,11 +133,13 @@ def _environment(
     if task not in _core.task_names():
         raise _core.InputError(f"task {task!r} is not of the catalogue; expected its class")
     scene = gym.task_scene(task)
-    step = _core.Model(scene).timestep
+    model = _core.Model(scene)
+    sensors = [sensor.name for sensor in model.sensors]
     declared = {"q", "v", *(tensor.name for tensor in _core.task_spec(task).observations)}
     readings = [
-        f"{key}/{round(windows[key]['seconds'] / step)}" if key in windows else key
+        f"{key}/{round(windows[key]['seconds'] / model.timestep)}" if key in windows else key
         for key in sorted(keys - declared)
+        if any(key == sensor or key.startswith(f"{sensor}.") for sensor in sensors)
     ]
     return gym.make_vec(
         task, num_envs, threads=threads, normalise=False, scene=scene, readings=readings

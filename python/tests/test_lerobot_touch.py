@@ -280,7 +280,7 @@ def test_what_cannot_be_played_is_refused(generate, pushes, tmp_path):
     with pytest.raises(tangere.InputError, match="of a scene"):
         lerobot.play(still, tmp_path / "balls", 2)
     with pytest.raises(tangere.InputError, match="the task does not show \\['pad'\\]"):
-        lerobot.play(still, tmp_path / "balls", 2, task="dummy")
+        lerobot.play(still, tmp_path / "balls", 2, task="stable_grasp")
     with pytest.raises(tangere.InputError, match="expected a folder that export has written"):
         lerobot.play(still, pushes, 2)
 
