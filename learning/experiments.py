@@ -86,11 +86,11 @@ EXPERIMENTS = [
     Experiment("ppo-cap", "ppo.py cap_opening", 5, 300,
                "cap, touch, imitates 4/5", "87.3 %", first_seed=5),
     *(Experiment(f"skin-{skin}", f"ppo.py stable_grasp --skin {skin} {OTHER_SKINS[skin]}", 3, 60,
-                 f"stable grasp on {skin}")
+                 f"grasp, {skin}")
       for skin in ("springs", "layer")),
     *(Experiment(f"skin-{skin}-insertion",
                  f"ppo.py insertion_translation --skin {skin} {OTHER_SKINS[skin]}", 3, 100,
-                 f"insertion, x and y, on {skin}")
+                 f"insert, {skin}")
       for skin in ("springs", "layer")),
     Experiment("bc-push", CLONED, 3, 450, "box pushing, goal and touch, visits",
                data=f"pushes {PUSHES}", first_seed=5),
@@ -118,9 +118,9 @@ EXPERIMENTS = [
       for name, keys, seconds, text in (
           ("flow", "flow", 590, "flow of both pads"),
           ("markers", "left.rgb_marker right.rgb_marker left.rgb_marker_grip right.rgb_marker_grip",
-           400, "pictures with markers, at the grip and on the rim"),
+           400, "pictures with markers, grip and rim"),
           ("gels", "left.rgb right.rgb left.rgb_grip right.rgb_grip", 400,
-           "pictures without markers, at the grip and on the rim"))),
+           "pictures without markers, grip and rim"))),
     *(Experiment(f"match-{name}", f"matching.py out/learning/derived --match {weight}", 3, 60,
                  text, data=f"derived {DERIVED}")
       for name, weight, text in (("none", 0, "rows alone"), ("some", 0.01, "weight 0.01"),

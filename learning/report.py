@@ -173,7 +173,7 @@ def tables() -> str:
                       f"{runs[0]['rows']}", cost(runs)],
     )  # fmt: skip
     skins = table(
-        "| PPO of | " + " | ".join(SKINS) + " | runs |", ("skin-",),
+        "| PPO of … on | " + " | ".join(SKINS) + " | runs |", ("skin-",),
         lambda runs: [rate([run | {"test": run["tests"].get(skin, run["test"])} for run in runs])
                       for skin in SKINS],
     )  # fmt: skip

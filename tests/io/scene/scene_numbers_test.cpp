@@ -77,9 +77,9 @@ std::string scene_with(const std::string& lines) {
 <tactile name="skin" body="skin" type="rect_array" rect_pos0="-0.02 0.02 -0.005" )"
          R"(rect_pos1="0.02 -0.02 -0.005" axis0="0 -1 0" axis1="1 0 0" resolution="5 7" )"
          R"(kn="11" kt="0.01" mu="2" damping="0.003"/>
-<tactile name="gel" body="brick" type="rect_array" rect_pos0="-0.004 0.004 -0.025" )"
-         R"(rect_pos1="0.004 -0.004 -0.025" axis0="0 -1 0" axis1="1 0 0" resolution="9 9" )"
-         R"(modulus="4e5" thickness="4e-3" mu="1"><layer poisson="0.45"/></tactile>
+<tactile name="gel" body="skin" type="rect_array" rect_pos0="-0.004 0.004 -0.005" )"
+         R"(rect_pos1="0.004 -0.004 -0.005" axis0="0 -1 0" axis1="1 0 0" resolution="9 9" )"
+         R"(modulus="4e5" thickness="4e-3" mu="1" ks="0"><layer poisson="0.45"/></tactile>
 </sensor>
 <randomize>
 )" + lines +
