@@ -36,13 +36,13 @@ void NumberGradients::add(const SceneNumber& number, Terms terms, int body) {
 }
 
 /// Whether a coefficient has no derivative: with ks = 0 there is no shear state, and kn of a layer
-/// that is the contact, or has markers or pictures, is constant (compile.cpp).
+/// or a table follows from its pressures. Where it varies, it scales E.
 static bool is_constant(const Scene& scene, const SceneNumber& of) {
-  if (of.field == Field::ks) return number_in(scene, of) == 0 && randomization_of(scene, of) < 0;
-  return of.field == Field::kn && of.owner == Owner::tactile &&
-         std::any_of(scene.sensors.begin(), scene.sensors.end(), [&](const auto& sensor) {
-           return sensor.name == of.name && sensor.layer &&
-                  (sensor.markers || sensor.picture || sensor.layer->feedback);
+  const bool varies = randomization_of(scene, of) >= 0;
+  if (of.field == Field::ks) return number_in(scene, of) == 0 && !varies;
+  return of.field == Field::kn && of.owner == Owner::tactile && !varies &&
+         std::ranges::any_of(scene.sensors, [&](const TactileDescription& sensor) {
+           return sensor.name == of.name && (sensor.layer || sensor.table);
          });
 }
 

@@ -72,6 +72,7 @@ std::vector<double> effective_inertias(Scene scene, const std::vector<int>& dofs
     if (tendons.contains(link.joint.name)) {
       with_armature.push_back(link.joint);
       link.joint.type = JointType::fixed;
+      link.joint.rest.clear();
     }
     link.joint.follows.clear();
     dof += dof_count(link.joint.type);

@@ -333,6 +333,18 @@ void add_feedback(Scene& scene, const SceneNode& node, const TactileDescription&
   add_sensor_contacts(scene, d);
 }
 
+/// Warns of a kn that has no effect: the load of a layer follows from its material.
+void warn_of_idle_kn(const SceneElement& node, const TactileDescription& d) {
+  constexpr double kNear = 0.01;
+  if (!node.gives("kn") || !d.material || !d.points.empty()) return;
+  const double area = cell_of(node, d.array), own = skin_springs(*d.material).kn;
+  if (std::abs(d.coefficients.kn - own * area) > kNear * own * area)
+    node.warn(fmt::format(
+        "kn of {:.4g} N/m³ beside <layer>, whose load follows from modulus and thickness "
+        "({:.4g} N/m³): unless it varies it has no effect on the load; expected another modulus",
+        d.coefficients.kn / area, own));
+}
+
 /// Lets the layer of a sensor be its contact. Its normal force relaxes by itself.
 void add_layer_feedback(Scene& scene, const SceneElement& node, TactileDescription& d) {
   const auto fail = [&](const std::string& what) {
@@ -418,6 +430,7 @@ void read_sensors(Scene& scene, const SceneNode& section) {
     for (const auto& [name, list] : {std::pair{"feels", &d.feels}, {"ignores", &d.ignores}})
       if (node.has(name)) *list = body_names(node, name);
     static_cast<void>(sensed_bodies(scene, d));  // checks the names
+    if (d.layer && !d.layer->feedback) warn_of_idle_kn(node, d);
     if (d.layer && d.layer->feedback)
       add_layer_feedback(scene, node, d);
     else if (node.word("feedback") == 1)

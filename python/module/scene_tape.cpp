@@ -480,7 +480,7 @@ std::vector<double> SceneTape::merged(const NamedValues& values, bool placed) co
 
 /// Sets the numbers of now. Throws InputError for one that the scene could not have.
 void SceneTape::set_numbers(std::vector<double> numbers) {
-  for (std::size_t e = 0; e < count(); ++e)
+  for (std::size_t e = 0; e < count() && varying_count() > 0; ++e)
     numbers_->set_all_randomized(static_cast<int>(e), std::span<const double>(numbers).subspan(
                                                           e * varying_count(), varying_count()));
   now_ = std::move(numbers);

@@ -158,10 +158,24 @@ class Frames:
                     f"{self.name(place)} has {len(rows)} rows of {key!r}; expected {count}, one "
                     "for each action"
                 )
+        for key in episodes.keys:
+            if self._is_stack(key, arrays[key].shape[1:]):
+                arrays[key] = np.expand_dims(arrays[key], -2)
         success = np.zeros(count, bool)
         success[-1] = episode in self.solved
         arrays["success"] = success
         return arrays
+
+    def _is_stack(self, key: str, shape: Sequence[int]) -> bool:
+        """Whether an observation is that of curved pads, (pads, points, c), which have no rows and
+        columns. It is then read as (pads, points, 1, c)."""
+        sensors = self.episodes.sensors
+        if key in sensors or len(shape) != 3 or shape[-1] > 3:
+            return False
+        curved = [s for s in sensors.values() if "resolution" not in s]
+        return len(curved) == len(sensors) == shape[0] and all(
+            _points(s) == shape[1] for s in curved
+        )
 
     def _windowed(self, arrays: Arrays, place: int) -> Arrays:
         n, count = self.window, len(arrays["actions"])

@@ -228,7 +228,7 @@ def _check_window(frames: Frames, felt: Sequence[str], touch: Touch | None) -> N
 def _pictures(key: str, frames: Frames) -> list[Feature]:
     """One picture for each pad. Its range is the largest number of the component, of all pads."""
     shape = frames.shapes[key]
-    if len(_grid_axes(shape)) != 2:
+    if len(_grid_axes(shape)) != 2 or shape[-2] == 1:
         raise _core.InputError(
             f"{frames.episodes.path}: touch 'image' of {key!r}, (points, {shape[-1]}), which has "
             "no rows and columns; expected touch 'state'"

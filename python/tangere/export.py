@@ -120,8 +120,24 @@ def export(
     )  # fmt: skip
     return Exported(
         str(output), to, complete, len(frames.lengths), len(frames), len(format.parts),
-        format.fps, frames.seconds, format.names, getattr(format, "notes", []),
+        format.fps, frames.seconds, format.names,
+        [*getattr(format, "notes", []), *_left_out(to, episodes, options)],
     )  # fmt: skip
+
+
+def _left_out(to: To, episodes: Episodes, options: dict[str, Any]) -> list[str]:
+    """Notes about observations that this format is not given."""
+    notes = []
+    hidden = [key for key in episodes.keys if key in episodes.privileged]
+    if hidden and to in ("lerobot", "zarr") and not options.get("privileged"):
+        notes.append(
+            f"left out, because a robot could not measure them: {', '.join(hidden)}; "
+            "--privileged writes them"
+        )
+    thinned = [str(name) for name in episodes.attributes.get("samples", [])]
+    if thinned:
+        notes.append(f"left out, because they are not in every row: {', '.join(thinned)}")
+    return notes
 
 
 def _chosen(episodes: Episodes, mask: str | None, only_success: bool) -> list[int]:

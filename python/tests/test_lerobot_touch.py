@@ -81,6 +81,24 @@ def test_touch_in_vectors_is_means_over_blocks(caps, tmp_path):
     assert names[9:11] == ["tips[0][0]", "tips[0][1]"] and names[-1] == "tactile.mean[2][2]"
 
 
+def test_curved_pads_of_a_task_stay_apart(generate, tmp_path):
+    turns = generate("in_hand", "--episodes", "2", "--seed", "1")
+    lerobot.export(turns, tmp_path / "out", touch="state")
+    field = stored(turns, "tactile").astype(float)  # (n, 4, 64, 3)
+    grid = np.array(rows_of(tmp_path / "out", "observation.environment_state"))
+    np.testing.assert_allclose(
+        grid.reshape(len(field), 4, 32, 3), field.reshape(-1, 4, 32, 2, 3).mean(3), atol=1e-9
+    )
+    names = names_of(tmp_path / "out", "observation.state")
+    state = np.array(rows_of(tmp_path / "out", "observation.state"))
+    means = [k for k, name in enumerate(names) if name.startswith("tactile.mean")]
+    np.testing.assert_allclose(
+        state[:, means].reshape(-1, 4, 3), field.mean(2), rtol=1e-5, atol=1e-9
+    )
+    with pytest.raises(tangere.InputError, match="tactile"):
+        lerobot.export(turns, tmp_path / "seen", touch="image")
+
+
 def test_a_small_field_keeps_every_point(pushes, tmp_path):
     lerobot.export(pushes, tmp_path / "out", touch="state", privileged=True)
     grid = np.array(rows_of(tmp_path / "out", "observation.environment_state"), np.float32)
@@ -194,9 +212,13 @@ def test_touch_that_cannot_be_written_is_refused(generate, pushes, tmp_path, cap
 
 
 def test_the_command_names_what_policies_do_not_read(pushes, tmp_path, capsys):
+    hidden = (
+        "note: left out, because a robot could not measure them: q, v; "
+        "--privileged writes them\n"
+    )
     for words, note in (
-        ([], "note: policies of lerobot do not read observation.tactile; see --touch\n"),
-        (["--touch", "state"], ""),
+        ([], hidden + "note: policies of lerobot do not read observation.tactile; see --touch\n"),
+        (["--touch", "state"], hidden),
         (["--touch", "image", "--privileged"], ""),
     ):
         assert lerobot.main([str(pushes), str(tmp_path / "out"), "--overwrite", *words]) == 0

@@ -85,6 +85,20 @@ def test_data_sets_have_bytes(command, tmp_path, compress):
     np.testing.assert_array_equal(episodes[1]["gel.rgb"], pictures)
 
 
+def test_the_material_of_a_layer_may_be_the_only_parameter():
+    torch = pytest.importorskip("torch", reason="PyTorch is not installed")
+    import tangere.torch as tt
+
+    text = Path(GEL).read_text().replace(VARIES, "")
+    sim = tt.Simulation(tangere.Scene.from_string(text), 1, 60, every=60, read=["gel"], threads=1)
+    numbers = sim.parameters("tactile gel thickness", "tactile gel poisson")
+    for value in numbers.values():
+        value.requires_grad_(True)
+    u = torch.tensor([[0.0, 0.0, -0.001]], dtype=torch.float64)
+    sim.step(sim.reset(parameters=numbers), u)["gel"].sum().backward()
+    assert all(value.grad.abs().max() > 0 for value in numbers.values())
+
+
 @pytest.mark.parametrize("layer", [True, False])
 def test_gradients_agree_with_differences(layer):
     torch = pytest.importorskip("torch", reason="PyTorch is not installed")

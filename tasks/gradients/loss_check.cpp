@@ -223,11 +223,11 @@ bool reads_fields(const RolloutLoss& loss, const CheckOptions& options) {
   return false;
 }
 
-/// Whether points of sensors are checked: a layer has no derivatives by them.
+/// Whether points of sensors are checked: a layer and a table have no derivatives by them.
 bool checks_points(const Model& model, const RolloutLoss& loss, const CheckOptions& options) {
   return reads_fields(loss, options) &&
          std::ranges::none_of(model.scene().sensors,
-                              [](const TactileDescription& d) { return d.layer.has_value(); });
+                              [](const TactileDescription& d) { return d.layer || d.table; });
 }
 
 LossGradient gradient_of(const Batch& start, const StepControls& controls, const RolloutLoss& loss,

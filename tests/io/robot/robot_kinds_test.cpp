@@ -275,6 +275,12 @@ TEST_F(RobotKinds, ADampingRatioIsThatOfTheInertiaThatMoves) {
                       "<general joint=\"a\" biastype=\"affine\" gainprm=\"3\" "
                       "biasprm=\"0 -3 0.7\"/>"),
               1.4 * std::sqrt(3 * inertia), 1e-12);
+  // A tendon with a length at rest adds no inertia.
+  EXPECT_NEAR(damping("",
+                      "<position joint=\"a\" kp=\"3\" dampratio=\"0.7\"/></actuator><tendon>"
+                      "<fixed name=\"t\" stiffness=\"2\" springlength=\"0.1\"><joint joint=\"a\" "
+                      "coef=\"1\"/></fixed></tendon><actuator>"),
+              1.4 * std::sqrt(3 * inertia), 1e-12);
   const std::string chain =
       "<body pos=\"0.3 0 0.1\"><joint name=\"b\" type=\"slide\" axis=\"1 0 0\"/>"
       "<geom type=\"capsule\" size=\"0.03 0.1\" euler=\"0 1 0\"/><body pos=\"0 0 0.1\">"

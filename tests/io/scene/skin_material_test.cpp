@@ -151,6 +151,25 @@ TEST(SkinMaterial, TheStiffnessRatioIsThatOfTheLayerFormula) {
     EXPECT_NEAR(stiffness_ratio(size) / kUsualStiffnessRatio, 1, 0.052) << size;
 }
 
+/// The load of a layer follows from its material alone.
+TEST(SkinMaterial, AKnBesideALayerIsAWarningUnlessItIsTheMaterials) {
+  const auto warnings = [](const std::string& kn) {
+    return parse_scene(
+               "<tangere><option unit=\"m-kg\"/><robot><link name=\"plate\"><joint "
+               "name=\"fixed\" type=\"fixed\"/><body name=\"plate\" type=\"cuboid\" "
+               "size=\"0.1 0.1 0.01\" pos=\"0 0 -0.005\"/></link></robot><sensor>" +
+                   kPad + "modulus=\"2e5\" thickness=\"6e-3\" " + kn +
+                   "><layer/></tactile></sensor></tangere>",
+               "s.xml")
+        .warnings;
+  };
+  const auto named = ::testing::Contains(HasSubstr("kn of 1.5e+08 N/m³ beside <layer>"));
+  EXPECT_THAT(warnings("kn=\"1.5e8\""), named);
+  EXPECT_THAT(warnings(""), ::testing::Not(named));
+  EXPECT_THAT(warnings("kn=\"7.6667e7\""),
+              ::testing::Not(::testing::Contains(HasSubstr("beside"))));
+}
+
 /// Forces under a ball of radius 7.5 mm (Helmut et al., FEATS): depth [mm], force [N].
 TEST(SkinMaterial, TheMeasuredLayoutCarriesTheMeasuredForces) {
   constexpr double kMeasured[][2] = {{0.5, 1.6503}, {1.0, 5.9641}, {1.5, 13.5257}, {2.0, 23.2532}};
