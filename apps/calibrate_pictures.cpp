@@ -25,7 +25,7 @@ constexpr const char* kTable = "presses.csv";
 constexpr const char* kBackground = "background.png";
 constexpr double kLongest = 0.1;     // of a ball and of a pixel [m], as of a gel file
 constexpr float kLeastChange = 3;    // of a photograph by its press [grey levels]
-constexpr double kMostGrowth = 1.3;  // of the radius of a label, either way, that is not doubted
+constexpr double kMostGrowth = 1.3;  // of the radius of a label, either way, without a warning
 constexpr double kMostMove = 0.5;    // of its place, by its radius
 
 struct Photographs {
@@ -127,7 +127,8 @@ double moved(const BallPress& press, const PressScore& score) {
   return std::hypot(score.refined.x - press.label.x, score.refined.y - press.label.y);
 }
 
-/// Doubts labels that the fit took far away: one of them spoils the lamps.
+/// Warns of labels whose circle the fit changed by more than kMostGrowth or kMostMove: one wrong
+/// label changes all lamps.
 void note_doubtful_labels(const Photographs& of, const GelFit& fit, const Console& console) {
   for (std::size_t k = 0; k < fit.scores.size(); ++k) {
     const double labelled = of.presses[k].label.radius, found = fit.scores[k].refined.radius,

@@ -31,6 +31,7 @@ void subtract_shares(const CompiledModel& m, BasicWorkspace<L>& w, const Vec6<do
     for (int i = 0; i < kernels::kSizeNumbers; ++i)
       subtract(m.view.rows.solid(m.pairs[std::size_t(k)].body2) + i, (&bodies[b].size.x)[i]);
   }
+  if (m.layer_pads[std::size_t(pad)].layer->surface) return;  // it has no numbers of its material
   const int row = m.layer_row(m.layer_pads[std::size_t(pad)].sensor);
   loss.parameters[row][lane] -= dot(slip, contact.change(bodies, {}, {1, 0}));
   loss.parameters[row + 1][lane] -= dot(slip, contact.change(bodies, {}, {0, 1}));

@@ -75,7 +75,7 @@ void NumberGradients::add_contacts() {
     add_coefficients(first_number(c), {rows.ground(k++)});
   k = 0;
   for (const auto& t : m.scene.sensors) add_coefficients(first_number(t), {rows.sensor(k++)});
-  // How the surface that a camera sees follows from the material is not worked out.
+  // The motion of a surface (markers, pictures) has no derivative by the material.
   for (k = 0; k < static_cast<int>(m.sensors.size()); ++k) {
     const TactileDescription& t = m.scene.sensors[std::size_t(k)];
     if (!t.layer || t.markers || t.picture) continue;

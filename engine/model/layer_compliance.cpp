@@ -171,7 +171,7 @@ std::array<int, 2> offset_counts(const LayerGrid& grid) {
   return {below ? 2 * grid.rows + *below : grid.rows, beside ? 2 * grid.cols + *beside : grid.cols};
 }
 
-/// C(0) … by the direction of a thickness and a Poisson's ratio.
+/// Derivative of compile_layer() along the tangents of the thickness and of Poisson's ratio.
 LayerCompliance slope_along(const LayerGrid& grid, const D& thickness, const D& poisson) {
   const auto [rows, cols] = offset_counts(grid);
   std::vector<double> changes;

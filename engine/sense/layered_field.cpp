@@ -259,7 +259,7 @@ void LayeredField::pull_back(std::span<const double> field_bar, bool numbers, Co
     if (points_[i].known.by != DepthBy::end)
       pull_back_point(points_[i], slant_bar_[i], numbers, out);
   out.material = {};
-  if (numbers && !layer.table) pull_back_material(out);
+  if (numbers && !layer.table && !layer.surface) pull_back_material(out);
 }
 
 /// Adds the cotangents of the layer's material, from the pressures and from depths that follow from

@@ -40,7 +40,7 @@ class LayeredField {
     LayerMaterial material{};                              ///< of a layer
   };
   /// Pulls the cotangent of the field back. Overwrites all of `out`. `numbers`: also by sizes of
-  /// shapes and by the layer's material.
+  /// shapes and by the material of a layer without a surface.
   void pull_back(std::span<const double> field_bar, bool numbers, Cotangents& out);
 
   /// Computes how the last field changes when the springs' fields and the shapes do: (points, 3).

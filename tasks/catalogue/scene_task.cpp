@@ -31,8 +31,8 @@ struct NamedReading {
 
 constexpr const char* kShearState = "shear_state";
 
-/// Whether a name is one of what a camera of the scene sees.
-bool is_seen(const Scene& scene, const std::string& name) {
+/// Whether a name is that of a picture of a camera of the scene.
+bool is_camera_picture(const Scene& scene, const std::string& name) {
   return std::ranges::any_of(scene.cameras, [&](const CameraDescription& camera) {
     return name.starts_with(camera.name + '.');
   });
@@ -41,7 +41,7 @@ bool is_seen(const Scene& scene, const std::string& name) {
 std::vector<std::string> known_names(const Model& model) {
   std::vector<std::string> names = output_names(model.scene());
   std::erase_if(names, [&](const std::string& name) {
-    if (is_seen(model.scene(), name)) return true;
+    if (is_camera_picture(model.scene(), name)) return true;
     const auto field = find_output(sensor_names(model.scene()), name);
     return name == "q" || name == "v" || name == "memory" || name == "transmissions" ||
            (field && !reason_against(model.scene(), *field).empty());
@@ -63,7 +63,7 @@ NamedReading reading_named(const Model& model, const std::string& name) {
     if (end_effectors[k].name == name)
       return {.first_end_effector = static_cast<int>(k), .end_effectors = 1};
   if (name == kShearState && shear_state_arrays(model).count() > 0) return {.shear_state = true};
-  if (is_seen(model.scene(), name))
+  if (is_camera_picture(model.scene(), name))
     throw InputError(
         fmt::format("'{}' is of a camera, whose pictures have no derivatives; expected one of {}",
                     name, fmt::join(known_names(model), ", ")));

@@ -124,9 +124,9 @@ TEST_P(LayerGradient, DualNumbersReverseAndDifferencesAgree) {
 
     // Differences by the state and by the material; a difference across a point that begins to
     // press is one-sided.
-    Numbers by_state(here.size()), of_material(rows);
-    if (layered) std::copy_n(&dp[material], 2, &of_material[material]);
-    Tangent(model).field(at.batch, 0, kLayerLane, at.tape, 0, 0, of_material, {}, {dq, dv, {}, {}},
+    Numbers by_state(here.size()), material_dot(rows);
+    if (layered) std::copy_n(&dp[material], 2, &material_dot[material]);
+    Tangent(model).field(at.batch, 0, kLayerLane, at.tape, 0, 0, material_dot, {}, {dq, dv, {}, {}},
                          by_state);
     const auto moved = [&](double e) {
       PadState t = s;

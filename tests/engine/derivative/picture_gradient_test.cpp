@@ -91,7 +91,7 @@ TEST(PictureGradient, OfSpringsIsThatOfDifferences) {
     for (std::size_t k = 0; k < 3; ++k) largest = std::max(largest, std::abs(c.q[16 * k + kSeen]));
     EXPECT_GT(largest, 1);
     const double step = 1e-9, faster = 1e-7;
-    double by_motion = 0;
+    double largest_v_bar = 0;
     for (std::size_t k = 0; k < 3; ++k) {
       const auto along = [&](double dq, double dv) {
         Numbers q_there = q, v_there = v;
@@ -101,13 +101,13 @@ TEST(PictureGradient, OfSpringsIsThatOfDifferences) {
       EXPECT_NEAR(c.q[16 * k + kSeen], (along(step, 0) - along(-step, 0)) / (2 * step),
                   1e-4 * largest)
           << to_string(form) << " " << k;
-      const double by_v = c.v[16 * k + kSeen];
-      EXPECT_NEAR(by_v, (along(0, faster) - along(0, -faster)) / (2 * faster),
-                  1e-4 * std::max(1.0, std::abs(by_v)))
+      const double v_bar = c.v[16 * k + kSeen];
+      EXPECT_NEAR(v_bar, (along(0, faster) - along(0, -faster)) / (2 * faster),
+                  1e-4 * std::max(1.0, std::abs(v_bar)))
           << to_string(form) << " " << k;
-      by_motion = std::max(by_motion, std::abs(by_v));
+      largest_v_bar = std::max(largest_v_bar, std::abs(v_bar));
     }
-    EXPECT_EQ(by_motion > 1, form == FieldForm::rgb_marker);
+    EXPECT_EQ(largest_v_bar > 1, form == FieldForm::rgb_marker);
     const double by_radius =
         c.parameters[std::size_t(compiled(model).view.rows.solid(1)) * 16 + kSeen];
     const double expected = (weighted(seen_press(kBallSize + step), q, v, form, weights) -

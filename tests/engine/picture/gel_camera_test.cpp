@@ -354,7 +354,7 @@ TEST(GelCamera, PullsBackToTheMotionOfItsMarkers) {
   }
 }
 
-/// Light sees a surface that the gel blurs; heights are those of the surface.
+/// Colours follow from the blurred surface, heights from the surface itself.
 TEST(GelCamera, HeightsAreNotBlurred) {
   Gel gel = grey_gel(100);
   gel.blur = 5e-4;
