@@ -18,6 +18,7 @@
 #include "apps/text_output.hpp"
 #include "engine/model/model.hpp"
 #include "engine/scene/scene_number.hpp"
+#include "engine/scene/sensed_bodies.hpp"
 #include "engine/step/control.hpp"
 #include "engine/step/stepper.hpp"
 #include "kernels/table/isa.hpp"
@@ -107,6 +108,15 @@ Json bodies_json(const Model& model) {
   return bodies;
 }
 
+/// The bodies that a sensor senses.
+std::vector<std::string> sensed_names(const Model& model, std::size_t sensor) {
+  const Scene& scene = model.scene();
+  std::vector<std::string> names;
+  for (const int k : sensed_bodies(scene, scene.sensors[sensor]))
+    names.push_back(scene.links[std::size_t(k)].body.name);
+  return names;
+}
+
 Json sensors_json(const Model& model) {
   Json sensors = Json::array();
   for (std::size_t k = 0; k < model.sensors().size(); ++k) {
@@ -118,6 +128,7 @@ Json sensors_json(const Model& model) {
                        {"points", s.points},
                        {"every", s.every},
                        {"pressure_sign", s.pressure_sign},
+                       {"senses", sensed_names(model, k)},
                        {"markers", model.scene().sensors[k].markers.has_value()},
                        {"channels", s.channels}});
   }
@@ -228,6 +239,9 @@ std::string sensors_text(const Model& model) {
       text.pop_back();
       text += fmt::format(", {} channels in {}, map '{}'\n", s.channels, map.unit, map.name);
     }
+    const std::vector<std::string> sensed = sensed_names(model, k);
+    text += fmt::format("    senses {}\n",
+                        sensed.empty() ? "nothing" : fmt::format("{}", fmt::join(sensed, ", ")));
   }
   return text;
 }

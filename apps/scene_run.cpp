@@ -129,9 +129,9 @@ void warn_about_geometry(const Console& console, const Model& model) {
           "where walls or details are thinner than about 1.5 cells; expected a larger 'resolution' "
           "or a smaller 'error'",
           mesh.body, mesh.cell, 100 * mesh.unresolved));
-  for (const auto& lines :
-       {start_overlaps(model), sensors_inside(model), unchecked_overlaps(model),
-        rounded_places(model), open_loops(model), paths_through_surfaces(model)})
+  for (const auto& lines : {start_overlaps(model), sensors_inside(model), unchecked_overlaps(model),
+                            rounded_places(model), open_loops(model), paths_through_surfaces(model),
+                            transmissions_outside_limits(model)})
     for (const std::string& line : lines) console.note("warning: " + line);
 }
 

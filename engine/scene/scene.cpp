@@ -46,7 +46,7 @@ const char* to_string(JointType value) {
     case JointType::translational: return "translational";
     case JointType::free2d: return "free2d";
     case JointType::spherical: return "spherical";
-    case JointType::free: return "free";
+    case JointType::free: return "free3d";
   }
   return "unknown";
 }

@@ -505,7 +505,7 @@ struct Scene {
   Source gravity_source{};  ///< the <option> that gives gravity; line 0: none does
 };
 
-/// The name users write and read: "free", "clamped" …
+/// The name users write and read: "free3d", "clamped" …
 const char* to_string(JointType value);
 const char* to_string(ContactLaw value);
 const char* to_string(Distribution::Kind value);  ///< as in scene files

@@ -23,7 +23,7 @@ using J = JointEffects;
 using L = LoopDescription;
 
 constexpr const char *kNone = "", *kNeeded = nullptr;
-constexpr const char* kMoving = "revolute prismatic planar translational free2d spherical free";
+constexpr const char* kMoving = "revolute prismatic planar translational free2d spherical free3d";
 constexpr const char *kSingle = "revolute prismatic", *kSkins = "rect_array hemisphere cylinder";
 constexpr const char* kDry = "revolute prismatic planar translational free2d";
 constexpr int kParameter = kVaries | kGradient;

@@ -34,4 +34,8 @@ std::vector<std::string> rounded_places(const Model& model);
 /// through that surface.
 std::vector<std::string> paths_through_surfaces(const Model& model);
 
+/// Returns a line for each joint whose coordinate is that of a transmission and starts outside its
+/// limits, at the starting state of the scene's first environment with seed 0.
+std::vector<std::string> transmissions_outside_limits(const Model& model);
+
 }  // namespace tangere

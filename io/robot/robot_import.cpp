@@ -52,12 +52,26 @@ double largest_force(const MotorDescription& m) {
   return largest;
 }
 
+/// The force with which a position motor moves its joint from one end of the targets to the other;
+/// 0 for other motors, and where the targets have no bound.
+double force_across_targets(const MotorDescription& m) {
+  if (m.control != MotorControl::position) return 0;
+  const double span = std::abs(m.scale.value_or(1)) * (m.u_range[1] - m.u_range[0]);
+  return std::isfinite(span) ? std::min(m.P * span, std::max(std::abs(m.low), m.high)) : 0;
+}
+
 /// The force or torque that a limit should hold: the weight of what hangs on the joint, or its
-/// motors' largest force. Of a joint without mass, those of the joints that it follows.
+/// motors' largest force. Of a joint without mass, those of the joints that it follows. What a loop
+/// should hold includes force_across_targets().
 class LimitLoads {
  public:
-  explicit LimitLoads(const Robot& robot)
-      : robot_(robot), scene_(robot.scene), model_(scene_), known_(scene_.links.size()) {
+  enum class Holder { limit, loop };
+  explicit LimitLoads(const Robot& robot, Holder holder = Holder::limit)
+      : robot_(robot),
+        scene_(robot.scene),
+        holder_(holder),
+        model_(scene_),
+        known_(scene_.links.size()) {
     for (const LinkDescription& link : scene_.links)
       at_.push_back(link.parent < 0 ? link.joint.pose
                                     : compose(at_[std::size_t(link.parent)], link.joint.pose));
@@ -70,7 +84,9 @@ class LimitLoads {
     if (const auto effort = robot_.efforts.find(joint.name); effort != robot_.efforts.end())
       load = std::max(load, effort->second);
     for (const MotorDescription& m : scene_.motors)
-      if (m.joint == joint.name) load = std::max(load, largest_force(m));
+      if (m.joint == joint.name)
+        load = std::max(
+            {load, largest_force(m), holder_ == Holder::loop ? force_across_targets(m) : 0.0});
     if (is_transmission(scene_, joint)) load = std::max(load, whole_weight());
     for (std::size_t k = 0; k < joint.follows.size() && weight(i) == 0; ++k)
       for (std::size_t leader = 0; leader < scene_.links.size(); ++leader)
@@ -118,6 +134,7 @@ class LimitLoads {
 
   const Robot& robot_;
   const Scene& scene_;
+  Holder holder_;
   Model model_;
   std::vector<Pose> at_;
   std::vector<std::optional<double>> known_;  ///< loads
@@ -159,7 +176,7 @@ double loop_load(const Scene& scene, LimitLoads& loads, std::size_t link, const 
 /// Chooses the stiffness of loops: under their load they yield by kLoopGap.
 void stiffen_loops(Robot& robot) {
   if (robot.scene.loops.empty()) return;
-  LimitLoads loads(robot);
+  LimitLoads loads(robot, LimitLoads::Holder::loop);
   for (LoopDescription& loop : robot.scene.loops) {
     const auto link_of = [&](const std::string& body) {
       return std::size_t(std::ranges::find_if(robot.scene.links,

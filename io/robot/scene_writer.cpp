@@ -51,10 +51,6 @@ std::string leaders_text(const std::vector<std::string>& names) {
   return fmt::format("{}{}", fmt::join(names, ", "), names.size() == 1 ? "," : "");
 }
 
-const char* joint_word(JointType type) {
-  return type == JointType::free ? "free3d" : to_string(type);
-}
-
 class Writer {
  public:
   Writer(const Robot& robot, const std::string& folder)
@@ -114,7 +110,7 @@ class Writer {
 
   void write_joint(const JointDescription& joint, const std::string& space) {
     out_ += fmt::format("{}<joint name=\"{}\" type=\"{}\"{}", space, attribute_text(joint.name),
-                        joint_word(joint.type), pose_text(joint.pose));
+                        to_string(joint.type), pose_text(joint.pose));
     if (joint.type == JointType::revolute || joint.type == JointType::prismatic)
       out_ += fmt::format(" axis=\"{}\"", vector_text(joint.axis0));
     JointEffects effects = joint;

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "engine/scene/outer_pose.hpp"
 #include "engine/scene/skin_material.hpp"
@@ -92,12 +93,16 @@ double area_of(const std::vector<Pose>& taxels) {
 /// Taxels in the order of their numbers.
 std::string taxels_text(const std::vector<RobotNode>& nodes) {
   std::vector<std::pair<int, Pose>> found;
+  std::set<int> numbers;
   for (const RobotNode& node : nodes) {
     node.check({{"idx"}, {"xyz"}, {"rpy"}});
     static_cast<void>(node.parts({{"geometry", Fate::idle, "for pictures only"}}));
-    found.emplace_back(node.integer("idx", 0, 1 << 24), read_place(node));
+    const int idx = node.integer("idx", 0, 1 << 24);
+    if (!numbers.insert(idx).second)
+      node.fail(fmt::format("idx=\"{}\": a taxel before has this number; expected one each", idx));
+    found.emplace_back(idx, read_place(node));
   }
-  std::ranges::stable_sort(found, {}, &std::pair<int, Pose>::first);
+  std::ranges::sort(found, {}, &std::pair<int, Pose>::first);
   std::vector<Pose> taxels;
   for (const auto& [idx, pose] : found) taxels.push_back(pose);
   return list_text(taxels, area_of(taxels));

@@ -7,10 +7,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <optional>
 #include <set>
 
+#include "engine/scene/frames.hpp"
 #include "engine/scene/sensed_bodies.hpp"
 #include "engine/scene/shapes.hpp"
 #include "io/scene/scene_sections.hpp"
@@ -131,10 +133,74 @@ class SensorWarnings {
                       "body does not come as deep; expected points on its surface",
                       -most));
     if (least > wide)
-      add(
+      return add(
           fmt::format("lies at least {:.3g} m off that body, which is {:.3g} m across; expected "
                       "points on its surface, in the body's frame and the scene's unit",
                       least, wide));
+    if (most > 0) warn_of_points_beside();
+  }
+
+  /// Bodies do not stop at points beside or above what moves rigidly with the sensor's body, so
+  /// such points read forces that nothing exerts. Half the distance between points is allowed.
+  void warn_of_points_beside() {
+    struct Part {
+      const Shape& shape;
+      kernels::Frame<double> in_group;
+    };
+    std::vector<Part> parts;
+    kernels::Frame<double> own = kIdentityFrame;
+    for (const LinkDescription& link : scene_.links) {
+      if (group_of(link.body.name) != own_) continue;
+      if (!distance_from(link.body.shape, {0, 0, 0})) return;  // a mesh may carry the points
+      parts.push_back({link.body.shape, frame_in_group(link)});
+      if (link.body.name == sensor_.body) own = parts.back().in_group;
+    }
+    const std::vector<TactilePoint> points = tactile_points(sensor_);
+    const double allowed = 0.5 * spacing(points);
+    std::size_t beside = 0;
+    double most = 0;
+    for (const TactilePoint& p : points) {
+      double least = std::numeric_limits<double>::infinity();
+      for (const Part& part : parts) {
+        const kernels::Frame<double> in_part = relative(part.in_group, own);
+        const kernels::Vec3<double> at = in_part.R * vec3_of(p.position) + in_part.p;
+        least = std::min(least, distance_from(part.shape, {at.x, at.y, at.z})->distance);
+      }
+      if (!(least > allowed)) continue;
+      ++beside;
+      most = std::max(most, least);
+    }
+    if (beside > 0)
+      add(
+          fmt::format("has {} of {} points up to {:.3g} m off that body and what is rigidly joined "
+                      "to it, where bodies reach without a contact, so they read forces that "
+                      "nothing exerts; expected points on its surface, to {:.2g} m",
+                      beside, points.size(), most, allowed));
+  }
+
+  /// The frame of a link's body in the frame of the moving link that it is rigidly joined to.
+  [[nodiscard]] kernels::Frame<double> frame_in_group(const LinkDescription& link) const {
+    kernels::Frame<double> frame = to_frame(link.body.pose);
+    const LinkDescription* up = &link;
+    while (up->joint.type == JointType::fixed) {
+      frame = compose(to_frame(up->joint.pose), frame);
+      if (up->parent < 0) break;
+      up = &scene_.links[std::size_t(up->parent)];
+    }
+    return frame;
+  }
+
+  /// Of the points on the widest face of the box around them, if they cover it evenly [m].
+  [[nodiscard]] static double spacing(const std::vector<TactilePoint>& points) {
+    std::array<double, 3> extent{};
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto [low, high] =
+          std::ranges::minmax(points, {}, [&](const TactilePoint& p) { return p.position[k]; });
+      extent[k] = high.position[k] - low.position[k];
+    }
+    std::ranges::sort(extent, std::greater<>());
+    const auto n = static_cast<double>(points.size());
+    return std::max(std::sqrt(extent[0] * extent[1] / n), extent[0] / n);
   }
 
   /// For an array its corners, which bound all points, and some between them.
@@ -201,6 +267,10 @@ class Starts {
   std::vector<std::optional<Start>> starts_;  // (links); empty: not computed yet
 };
 
+bool is_path_length(const Scene& scene, const std::string& joint) {
+  return std::ranges::any_of(scene.transmissions, [&](const auto& t) { return t.joint == joint; });
+}
+
 }  // namespace
 
 void warn_of_starts(const Scene& scene, const SceneNode& root) {
@@ -214,6 +284,7 @@ void warn_of_starts(const Scene& scene, const SceneNode& root) {
     const JointDescription& joint = scene.links[k].joint;
     if (joint.type != JointType::revolute && joint.type != JointType::prismatic) continue;
     if (!joint.limits || joint.limit_stiffness <= 0) continue;
+    if (is_path_length(scene, joint.name)) continue;  // lengths_outside_limits() tests it
     const auto [q, drawn] = starts.at(k);
     if (drawn) continue;
     const auto [low, high] = *joint.limits;

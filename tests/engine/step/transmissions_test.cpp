@@ -118,6 +118,21 @@ TEST(Transmissions, HaveTheLengthsOfTheirPaths) {
   EXPECT_NEAR(length_through({ball, end, half, ball, up}), std::hypot(0.5, 0.01) + 0.3, 1e-15);
 }
 
+/// A path's length is the coordinate of its joint from the start on, whatever <initial> says.
+TEST(Transmissions, LengthsThatStartOutsideLimitsAreNamed) {
+  Scene s = slider();
+  const double length = Model(s).initial_q().back();
+  JointDescription& cord = s.links.back().joint;
+  cord.limit_stiffness = 10;
+  EXPECT_TRUE(transmissions_outside_limits(Model(s)).empty());
+  cord.limits = {length, length + 1};
+  EXPECT_TRUE(transmissions_outside_limits(Model(s)).empty());
+  cord.limits = {length + 0.01, length + 1};
+  const std::vector<std::string> lines = transmissions_outside_limits(Model(s));
+  ASSERT_EQ(lines.size(), 1U);
+  EXPECT_NE(lines[0].find("'cord' starts at "), std::string::npos) << lines[0];
+}
+
 /// A force at a point of a hinged bar does the work of its lever; a force along axes of another
 /// body has a length.
 TEST(Transmissions, StartsInsideASurfaceAreNamed) {

@@ -13,6 +13,7 @@
 #include "engine/step/stepper.hpp"
 #include "io/robot/robot_import.hpp"
 #include "io/scene/scene_reader.hpp"
+#include "tests/io/synthetic_run.hpp"
 
 namespace tangere {
 namespace {
@@ -228,6 +229,27 @@ TEST(RobotMotion, AFourBarLinkageStaysClosed) {
   Scene stiffer = scene;
   stiffer.loops[0].stiffness *= 10;
   EXPECT_LT(largest_joint_error(damped_loops(stiffer), truth, 3), 1e-4);
+}
+
+/// A position motor without a range of its force pulls at most across its targets.
+TEST(RobotMotion, LoopsHoldTheForceAcrossTargets) {
+  const auto stiffness = [](const std::string& motor) {
+    const testing::Folder folder;
+    std::ofstream(folder / "robot.xml")
+        << "<mujoco><worldbody><body name=\"a\"><joint name=\"j\" axis=\"0 1 0\"/>"
+           "<geom size=\"0.01\" pos=\"0.1 0 0\"/></body></worldbody><equality><connect body1=\"a\" "
+           "anchor=\"0.5 0 0\"/></equality><actuator>" +
+               motor + "</actuator></mujoco>";
+    const ImportedScene made = import_robot(folder / "robot.xml", folder / "scene.xml", {});
+    return parse_scene(made.text, "scene.xml").scene.loops.at(0).stiffness;
+  };
+  // 200 N m over 0.5 m, for 1 um.
+  EXPECT_DOUBLE_EQ(
+      stiffness("<position joint=\"j\" kp=\"100\" ctrllimited=\"true\" ctrlrange=\"-1 1\"/>"), 4e8);
+  EXPECT_DOUBLE_EQ(stiffness("<position joint=\"j\" kp=\"100\" ctrllimited=\"true\" "
+                             "ctrlrange=\"-1 1\" forcelimited=\"true\" forcerange=\"-50 50\"/>"),
+                   1e8);
+  EXPECT_LT(stiffness("<motor joint=\"j\" ctrllimited=\"true\" ctrlrange=\"-0.01 0.01\"/>"), 1e6);
 }
 
 /// An object that a <weld> holds in the hand of an arm.

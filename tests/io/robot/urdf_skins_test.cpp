@@ -111,6 +111,8 @@ TEST_F(UrdfSkins, MistakesNameTheLine) {
                        "</tactile></sensor>"),
               HasSubstr("robot.urdf:7: <parent>: no link is named 'tp'; did you mean 'tip'"));
   EXPECT_THAT(fault_of(sensor("")), HasSubstr("has no <array> and no <taxel>"));
+  EXPECT_THAT(fault_of(sensor("<taxel idx=\"3\" xyz=\"0 0 0\"/><taxel idx=\"3\" xyz=\"0 1 0\"/>")),
+              HasSubstr("idx=\"3\": a taxel before has this number"));
   EXPECT_THAT(fault_of(sensor("<taxel xyz=\"0 0 0\"/>")), HasSubstr("'idx' is missing"));
   EXPECT_THAT(fault_of(sensor("<array rows=\"2\" cols=\"2\" size=\"0.1 0\"/>")),
               HasSubstr("expected lengths above 0"));

@@ -16,7 +16,7 @@ using ::testing::IsEmpty;
 
 /// A finger of 20 × 20 × 20 mm with a skin, another one, and an object between them.
 struct Grasp {
-  std::string object = "type=\"cuboid\" size=\"0.02 0.02 0.02\"", inside_object;
+  std::string object = "type=\"cuboid\" size=\"0.02 0.02 0.02\"", inside_object, inside_finger;
   std::string contact =
       "<general_primitive_contact general_body=\"object\" primitive_body=\"finger\" kn=\"100\"/>";
   std::string corner0 = "-0.008 -0.008 0.01", corner1 = "0.008 0.008 0.01";
@@ -24,13 +24,14 @@ struct Grasp {
 
   [[nodiscard]] std::vector<std::string> warnings() const {
     const auto body = [](const std::string& name, const std::string& shape, const char* at,
-                         const std::string& inside = "") {
+                         const std::string& inside = "", const std::string& on = "") {
       return "<robot><link name=\"" + name + "\"><joint name=\"" + name +
              "\" type=\"free3d\" pos=\"0 0 " + at + "\"/><body name=\"" + name + "\" " + shape +
-             ">" + inside + "</body></link></robot>\n";
+             ">" + inside + "</body>" + on + "</link></robot>\n";
     };
     const std::string finger = "type=\"cuboid\" size=\"0.02 0.02 0.02\"";
-    return parse_scene("<tangere><option unit=\"m-kg\"/><ground/>\n" + body("finger", finger, "0") +
+    return parse_scene("<tangere><option unit=\"m-kg\"/><ground/>\n" +
+                           body("finger", finger, "0", "", inside_finger) +
                            body("thumb", finger, "0.05") +
                            body("object", object, "0.025", inside_object) + "<contact>" + contact +
                            "</contact>\n<sensor><tactile name=\"skin\" body=\"finger\" "
@@ -80,6 +81,26 @@ TEST(SceneWarnings, PointsBelowOrOffTheSurfaceAreTold) {
   g.corner1 = "0.008 0.008 1";
   EXPECT_THAT(g.warnings(), ElementsAre(HasSubstr("lies at least 0.99 m off that body, which is "
                                                   "0.02 m across")));
+}
+
+/// The finger ends at 10 mm, and points are 5 mm apart. A part that is rigidly joined to it carries
+/// points, and one that moves does not.
+TEST(SceneWarnings, PointsBesideTheFaceAreTold) {
+  Grasp g;
+  g.corner0 = "-0.01 -0.01 0.012", g.corner1 = "0.01 0.01 0.012";
+  EXPECT_THAT(g.warnings(), IsEmpty());  // less than half the distance between points
+  g.corner0 = "-0.014 -0.01 0.01", g.corner1 = "0.014 0.01 0.01";
+  EXPECT_THAT(g.warnings(),
+              ElementsAre(HasSubstr("has 10 of 25 points up to 0.004 m off that body and what is "
+                                    "rigidly joined to it")));
+  const auto with_part = [&](const char* joint) {
+    g.inside_finger = std::string("<link name=\"rim\"><joint name=\"rim\" type=\"") + joint +
+                      "\" pos=\"0 0 0.009\" quat=\"0.7071067811865476 0 0 0.7071067811865476\"/>"
+                      "<body name=\"rim\" type=\"cuboid\" size=\"0.02 0.03 0.002\"/></link>";
+    return g.warnings();
+  };
+  EXPECT_THAT(with_part("fixed"), IsEmpty());
+  EXPECT_THAT(with_part("revolute\" axis=\"1 0 0"), ElementsAre(HasSubstr("10 of 25")));
 }
 
 /// Points of the object are 4 mm apart, those of the skin too.

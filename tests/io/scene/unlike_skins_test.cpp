@@ -50,10 +50,10 @@ TEST(UnlikeSkins, StiffnessesThatDifferByOrdersAreTold) {
 }
 
 TEST(UnlikeSkins, CapsOfCylindersCountAndNothingThatIsNotKnownDoes) {
-  // 1 + 3 · 8 points on π (10 mm)² are 0.0796 per mm²
-  const std::string disc = "type=\"cylinder\" radius=\"0.01\" length=\"0.002\"";
-  EXPECT_THAT(warnings("50", "628", disc), IsEmpty());
-  EXPECT_THAT(warnings("50", "25120", disc), ElementsAre(HasSubstr("shows 0.025 times")));
+  // 1 + 3 · 8 points on π (12 mm)² are 0.0553 per mm²
+  const std::string disc = "type=\"cylinder\" radius=\"0.012\" length=\"0.002\"";
+  EXPECT_THAT(warnings("50", "904", disc), IsEmpty());
+  EXPECT_THAT(warnings("50", "36160", disc), ElementsAre(HasSubstr("shows 0.025 times")));
   EXPECT_THAT(warnings("50", "0"), IsEmpty());
   EXPECT_THAT(warnings("0", "50"), IsEmpty());
 }
