@@ -3,9 +3,11 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
+#include <iterator>
 
 #include "apps/arguments.hpp"
 #include "apps/calibrate_channels.hpp"
@@ -18,6 +20,7 @@
 #include "apps/run_options.hpp"
 #include "apps/text_output.hpp"
 #include "engine/base/error.hpp"
+#include "tasks/calibration/press_doubts.hpp"
 
 namespace tangere::apps {
 namespace {
@@ -34,7 +37,7 @@ struct CalibrateArguments {
   std::optional<double> hold_out, pixel;
   std::vector<double> nodes;
   double zero = 0;
-  bool overwrite = false;
+  bool score = false, overwrite = false;
 };
 
 void check_indenter(const CalibrateArguments& a) {
@@ -68,6 +71,13 @@ void check_arguments(const CalibrateArguments& a) {
     throw InputError(fmt::format("{} is missing; expected RECORDING and --sensor, or --pictures",
                                  a.recording.empty() ? "RECORDING" : "--sensor"));
   if (a.pixel) throw InputError("--pixel without --pictures; expected both");
+  if (a.score)
+    refuse("beside --score",
+           {{"--fit", !a.numbers.empty()},
+            {"--table", a.table.has_value()},
+            {"--hold-out", a.hold_out.has_value()},
+            {"--output", !a.output.empty()}},
+           "--score alone, which fits and writes nothing");
   check_indenter(a);
 }
 
@@ -76,6 +86,7 @@ int run_channels(const CalibrateArguments& a, const Console& console) {
          {{"--pictures", !a.pictures.empty()},
           {"--pixel", a.pixel.has_value()},
           {"--table", a.table.has_value()},
+          {"--score", a.score},
           {"--fit", !a.numbers.empty()}},
          "a fit of the skin's numbers of its own, before");
   check_indenter(a);
@@ -87,10 +98,11 @@ int run_channels(const CalibrateArguments& a, const Console& console) {
 /// A layout, and what a fit changes in it.
 struct Fitted {
   LayoutFile layout;
-  int knots = 0;          ///< of a table
-  bool per_area = false;  ///< whether coefficients count by area
-  SkinNumbers start;      ///< attributes that can be fitted
-  SkinNumbers own;        ///< of these, those that the layout has
+  int knots = 0;           ///< of a table
+  bool per_area = false;   ///< whether coefficients count by area
+  bool has_table = false;  ///< of its own, which stays
+  SkinNumbers start;       ///< attributes that can be fitted
+  SkinNumbers own;         ///< of these, those that the layout has
 };
 
 /// Sets the attributes that can be fitted, as the layout has them, where it has any.
@@ -158,8 +170,12 @@ void set_numbers(const SkinNumbers& numbers, int digits, Fitted& fitted) {
 }
 
 Fitted read_fitted(const CalibrateArguments& a) {
-  Fitted fitted{
-      LayoutFile(layout_text("--sensor", a.sensor), a.sensor), a.table.value_or(0), false, {}, {}};
+  Fitted fitted{LayoutFile(layout_text("--sensor", a.sensor), a.sensor),
+                a.table.value_or(0),
+                false,
+                false,
+                {},
+                {}};
   const Scene scene = press_scene(fitted.layout, a.indenter);
   const TactileDescription& d = scene.sensors[0];
   if (fitted.knots > 0) prepare_for_table(fitted, d);
@@ -168,7 +184,8 @@ Fitted read_fitted(const CalibrateArguments& a) {
     fitted.start.erase("modulus"), fitted.start.erase("kn");
     fitted.start.try_emplace("relaxation", kUsualRelaxation);
   } else if (d.table) {
-    throw InputError(a.sensor + " has a table of pressures; expected --table");
+    fitted.has_table = true;
+    fitted.start.erase("kn");
   }
   fitted.per_area = d.cell > 0 || fitted.knots > 0;
   return fitted;
@@ -181,33 +198,60 @@ void name_as_measured(LayoutFile& layout) {
   layout.set("name", name);
 }
 
-/// Returns the layout with the fitted attributes. If there are any, its sensor's name says that
-/// they were measured.
-std::string measured_layout(Fitted fitted, const Calibration& found, const std::string& recording) {
-  SkinNumbers numbers = found.found;
+/// The layout with what was fitted, and how far the forces of this very text are off.
+struct Written {
+  LayoutFile layout;
+  PressError error;
+};
+
+/// Returns the layout with the fitted attributes, whose forces are compared with the zeros and the
+/// lag of the recording, and without a slider, which no layout has.
+Written written_layout(Fitted fitted, const CalibrateArguments& a, const Calibration& found,
+                       const PressRecording& recording) {
+  SkinNumbers numbers = found.found, kept;
   for (const UntoldNumber& number : found.untold) numbers.erase(number.name);
   set_numbers(numbers, 5, fitted);
+  for (const char* const name : {kZero, kForceZero, kLag})
+    if (numbers.contains(name)) kept[name] = numbers[name];
+  const auto scene = [&](const SkinNumbers&) { return press_scene(fitted.layout, a.indenter); };
+  const PressError error =
+      check_calibration({.scene = scene, .start = {}}, kept, recording, found.rows);
+  return {std::move(fitted.layout), error};
+}
+
+/// Names the sensor as measured if anything of it was fitted, and adds comments.
+void add_remarks(const Fitted& fitted, const Calibration& found, const std::string& recording,
+                 Written& written) {
   std::vector<std::string> names;
-  for (const FittedNumber& number : found.numbers)
+  bool slider = false;
+  for (const FittedNumber& number : found.numbers) {
     if (fitted.start.contains(number.name)) names.push_back(number.name);
+    slider = slider || number.name == kSlider;
+  }
   if (fitted.knots > 0) names.emplace_back("pressure");
   const std::string file = std::filesystem::path(recording).filename().string();
+  LayoutFile& layout = written.layout;
   if (!names.empty()) {
-    name_as_measured(fitted.layout);
-    fitted.layout.add_comment(fmt::format(
+    name_as_measured(layout);
+    layout.add_comment(fmt::format(
         "{}: measured, fitted by 'tangere calibrate' to {}, {} rows, to {} of the peak",
-        fmt::join(names, ", "), file, found.normal.rows, percent(found.normal.root_mean_square)));
+        fmt::join(names, ", "), file, written.error.rows, percent(written.error.root_mean_square)));
   }
+  if (slider)
+    layout.add_comment(
+        fmt::format("without the slider that was fitted beside it, of {:.5g} N/m and {:.5g} N; "
+                    "with it to {} of the peak",
+                    found.found.at(kSlider), found.found.at(kSliderForce),
+                    percent(found.normal.root_mean_square)));
   const auto own = fitted.own.find(kFriction);
   if (found.least_friction > (own == fitted.own.end() ? 0 : own->second)) {
     const std::string mu = fmt::format("{:.5g}", found.least_friction);
-    fitted.layout.set(kFriction, mu);
-    fitted.layout.add_comment(
+    layout.set(kFriction, mu);
+    layout.add_comment(
         fmt::format("mu: a lower bound, because nothing slips: {} is the largest ratio of shear to "
                     "normal force in {}",
                     mu, file));
   }
-  return fitted.layout.text();
 }
 
 /// Refuses what a fit to photographs does not use.
@@ -218,6 +262,7 @@ void check_for_pictures(const CalibrateArguments& a) {
                                     {"--flat", a.indenter.flat.has_value()},
                                     {"--box", !a.indenter.box.empty()},
                                     {"--table", a.table.has_value()},
+                                    {"--score", a.score},
                                     {"--fit", !a.numbers.empty()},
                                     {"--hold-out", a.hold_out.has_value()},
                                     {"--check", !a.check.empty()}})
@@ -226,6 +271,26 @@ void check_for_pictures(const CalibrateArguments& a) {
     throw InputError(
         fmt::format("--pictures beside {}; expected --pictures with --ball and --pixel alone",
                     fmt::join(others, ", ")));
+}
+
+void warn(std::span<const std::string> doubts, std::size_t from, const std::string& file,
+          const Console& console) {
+  for (const std::string& doubt : doubts.subspan(from))
+    console.note(fmt::format("warning: {}: {}", file, doubt));
+}
+
+/// Says that a fitted table ends level; "" if it does not.
+std::string level_text(const Scene& scene) {
+  constexpr double kLevel = 1e-3;  // of the last pressure
+  const std::optional<PressureTable>& table = scene.sensors[0].table;
+  if (!table) return "";
+  const double last = table->pressure.back(), before = table->pressure.end()[-2];
+  if (last - before > kLevel * last) return "";
+  return fmt::format(
+      "the table ends level, with {:.3g} Pa from {:.3g} m on, so a body that goes "
+      "deeper presses no harder; expected a force that rises with the last depths, "
+      "or fewer pressures",
+      last, table->depth.end()[-2]);
 }
 
 int run_calibrate(const CalibrateArguments& a, const Console& console) {
@@ -241,6 +306,8 @@ int run_calibrate(const CalibrateArguments& a, const Console& console) {
       a.check.empty() ? std::nullopt : std::optional(read_press(a.check, console));
   TextOutput output(a.output, a.overwrite);
   const Fitted fitted = read_fitted(a);
+  if (fitted.has_table && !a.score)
+    console.note(a.sensor + ": its table of pressures stays; --table N fits another");
   const CalibrationRequest request{.scene =
                                        [&](const SkinNumbers& numbers) {
                                          Fitted trial = fitted;
@@ -250,12 +317,25 @@ int run_calibrate(const CalibrateArguments& a, const Console& console) {
                                    .start = fitted.start,
                                    .knots = fitted.knots,
                                    .numbers = a.numbers,
+                                   .fit = !a.score && !fitted.has_table,
                                    .hold_out = a.hold_out.value_or(0)};
+  std::vector<std::string> doubts =
+      doubts_of_press(press_scene(fitted.layout, a.indenter), recording);
+  warn(doubts, 0, a.recording, console);
   const Calibration found = calibrate(request, recording);
-  CalibrationReport report{found, fitted.own, fitted.per_area, fitted.knots, {}};
+  Written written = written_layout(fitted, a, found, recording);
+  CalibrationReport report{found, fitted.own, fitted.per_area, fitted.knots, written.error, {}, {}};
+  const std::size_t said = doubts.size();
+  const Scene skin = press_scene(written.layout, a.indenter);
+  std::ranges::copy(doubts_of_skin(skin), std::back_inserter(doubts));
+  if (const std::string level = level_text(skin); fitted.knots > 0 && !level.empty())
+    doubts.push_back(level);
+  warn(doubts, said, a.recording, console);
+  report.doubts = doubts;
   if (other) report.other = check_calibration(request, found.found, *other);
   console.print(report_text(report));
-  output.write(measured_layout(fitted, found, a.recording), console);
+  add_remarks(fitted, found, a.recording, written);
+  output.write(written.layout.text(), console);
   report_json(report, console);
   return found.converged ? kDone : kSomeFailed;
 }
@@ -301,14 +381,17 @@ Command add_calibrate(CLI::App& program) {
                         "Fit a table of N pressures by depth in place of modulus or kn");
   add_texts(app, "--fit", a.numbers, "NAME",
             "Fit this number and no others but those named so: modulus, kn or pressure (the "
-            "table), zero (of the depth), relaxation, ks, mu, lag (of the force), slider (beside "
-            "the skin) [default: all but the last two that the recording tells]");
+            "table), zero (of the depth), force_zero (of the load cell), relaxation, ks, mu, lag "
+            "(of the force), slider (beside the skin) [default: all but the last two that the "
+            "recording tells, and force_zero if rows are above the skin]");
   add_positive_number(
       app, "--hold-out", a.hold_out,
       "Rows that are compared and not fitted: how many, or a share below 1 [default: "
       "none; of --channels 0.2]");
   add_text(app, "--check", a.check, "OTHER.csv",
            "Another recording, whose normal forces or channels are compared with those of the fit");
+  add_flag(app, "--score", a.score,
+           "Fit nothing: compare the layout as it is. So is one with a table, without --table");
   add_overwrite_option(app, a.overwrite);
   add_console_options(app, *console);
   return {&app, [=](const ProgramInfo&) { return run_calibrate(*arguments, *console); }};

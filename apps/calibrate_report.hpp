@@ -14,7 +14,9 @@ struct CalibrationReport {
   const SkinNumbers& own;  ///< of the layout, where it has any
   bool per_area;           ///< whether coefficients count by area
   int knots;               ///< of a table
+  PressError written;      ///< of the layout as it is written, at the fitted rows
   PressError other;        ///< of another recording
+  std::vector<std::string> doubts;
 };
 
 /// A table of the numbers, the errors, and what the recording does not tell.

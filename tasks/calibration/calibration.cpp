@@ -11,12 +11,14 @@
 #include <functional>
 
 #include "engine/base/error.hpp"
+#include "tasks/calibration/press_doubts.hpp"
 
 namespace tangere {
 namespace {
 
 constexpr double kStuck = 1e3, kSlipStart = 0.9;  // of the largest ratio of shear to normal force
 constexpr double kStiffStart = 3;                 // of the spring that fits without slip
+constexpr double kUnlike = 0.3;                   // correlation of forces that have one sign
 constexpr double kSliderStart = 0.1;              // of the peak
 constexpr double kSmallest = 0.05;  // of the peak: smaller forces have no error of their own
 
@@ -74,10 +76,11 @@ bool varies(std::span<const double> column) {
 }
 
 /// Why the columns cannot tell a number; "" if they may.
-std::string reason_against(const std::string& name, const PressRecording& r, int rows) {
-  if ((name == kZero || name == kSlider || name == kTable) && !varies(r.depth))
+std::string reason_against(const std::string& name, const PressRecording& r, std::size_t rows) {
+  if ((name == kZero || name == kForceZero || name == kSlider || name == kTable) &&
+      !varies(r.depth))
     return "all rows have one depth";
-  if (name == kZero && rows < 2) return "one row is fitted";
+  if ((name == kZero || name == kForceZero) && rows < 2) return "one row is fitted";
   if ((name == kRelaxation || name == kLag) && r.time.empty()) return "the recording has no times";
   if ((name == kRelaxation || name == kLag) && r.rows() < 2) return "the recording has one row";
   if ((name == kShear || name == kFriction) && !varies(r.shear)) return "nothing is sheared";
@@ -86,31 +89,39 @@ std::string reason_against(const std::string& name, const PressRecording& r, int
 
 struct Names {
   std::vector<std::string> normal, shear;
+  std::vector<std::string> held;  ///< usual ones that the normal forces do not tell
 };
 
-/// Chooses what is fitted, by normal and by shear forces. `rows`: how many are fitted.
-Names choose_numbers(const CalibrationRequest& request, const PressRecording& recording, int rows,
-                     std::vector<UntoldNumber>& untold) {
+int rows_above(std::span<const double> depth, std::span<const int> rows) {
+  return int(std::ranges::count_if(rows, [&](int row) { return depth[std::size_t(row)] < 0; }));
+}
+
+/// Chooses what is fitted, by normal and by shear forces. `rows`: those that are fitted.
+Names choose_numbers(const CalibrationRequest& request, const PressRecording& recording,
+                     std::span<const int> rows, std::vector<UntoldNumber>& untold) {
   std::vector<std::string> usual, known;
   for (const char* const name : {"modulus", "kn"})
     if (request.start.contains(name) && request.knots == 0) usual.emplace_back(name);
   usual.emplace_back(request.knots > 0 ? kTable : kZero);
   for (const char* const name : {kRelaxation, kShear, kFriction})
     if (request.start.contains(name)) usual.emplace_back(name);
+  if (rows_above(recording.depth, rows) > 0) usual.emplace_back(kForceZero);
   known = usual;
-  if (request.knots > 0) known.emplace_back(kZero);
-  for (const char* const name : {kLag, kSlider}) known.emplace_back(name);
+  for (const char* const name : {kZero, kForceZero, kLag, kSlider})
+    if (std::ranges::count(known, name) == 0) known.emplace_back(name);
   for (const std::string& name : request.numbers)
     if (std::ranges::count(known, name) == 0)
       throw InputError(
           fmt::format("'{}' cannot be fitted; expected some of {}", name, fmt::join(known, ", ")));
   Names out;
+  if (!request.fit && request.numbers.empty()) return out;
   for (const std::string& name : request.numbers.empty() ? usual : known) {
     const bool requested = std::ranges::count(request.numbers, name) > 0;
     if (!request.numbers.empty() && !requested) continue;
-    if (const std::string reason = reason_against(name, recording, rows); !reason.empty()) {
+    if (const std::string reason = reason_against(name, recording, rows.size()); !reason.empty()) {
       if (requested) throw InputError(fmt::format("'{}' cannot be fitted: {}", name, reason));
       untold.push_back({name, reason});
+      if (name == kZero || name == kForceZero) out.held.push_back(name);
       continue;
     }
     auto& list = name == kShear || name == kFriction ? out.shear : out.normal;
@@ -158,6 +169,9 @@ std::vector<double> normal_forces(const CalibrationRequest& request, const Press
   acting.time = r.time, acting.depth = acting_depths(r, numbers);
   std::vector<double> force = press_forces(request.scene(numbers), acting.depth, acting.rates());
   add_slider(acting.depth, numbers, force);
+  const double offset = number_or(numbers, kForceZero, 0);
+  if (offset != 0)
+    for (double& f : force) f += offset;
   return force;
 }
 
@@ -184,6 +198,10 @@ void scale_start(const CalibrationRequest& request, const PressRecording& r, dou
   for (const char* const name : {"modulus", "kn"})
     if (start.contains(name)) straight[name] = start[name];
   const double factor = best_factor(normal_forces(request, r, straight), r.force);
+  if (const std::string reason = why_no_touch(request.scene(straight), depth);
+      !std::isfinite(factor) && !reason.empty())
+    throw InputError("the sensor feels nothing at any depth of the recording: " + reason +
+                     "; expected a larger ball, or points that are closer");
   if (!std::isfinite(factor))
     throw InputError(
         "the sensor feels nothing at any depth of the recording; expected depths in m, positive "
@@ -219,6 +237,43 @@ void scale_shear_start(const Forces& shear, const std::vector<std::string>& name
   start[kFriction] = kSlipStart * ratio;
 }
 
+/// Refuses a shear force whose sign is that of the indenter's other side.
+void check_shear_sign(const Forces& shear, const SkinNumbers& numbers,
+                      std::span<const double> recorded) {
+  const std::vector<double> computed = shear(numbers);
+  double both = 0, squares = 0, recorded_squares = 0;
+  for (std::size_t k = 0; k < computed.size(); ++k) {
+    both += computed[k] * recorded[k];
+    squares += computed[k] * computed[k], recorded_squares += recorded[k] * recorded[k];
+  }
+  const double alike = both / std::sqrt(squares * recorded_squares);
+  if (alike < -kUnlike)
+    throw InputError(
+        fmt::format("shear_force against the shear: its correlation with the computed force is "
+                    "{:.2f}; expected the force of the indenter on the skin, which has the sign of "
+                    "the shear: multiply shear_force or shear by -1",
+                    alike));
+}
+
+/// Finds what the friction of the sensor would do.
+FrictionShare friction_share(const CalibrationRequest& request, const PressRecording& r,
+                             const ForceFit& along, const SkinNumbers& found) {
+  const Scene scene = request.scene(found);
+  const ContactCoefficients& c = scene.sensors.at(0).coefficients;
+  FrictionShare out;
+  if (!(c.mu > 0) || !(c.ks > 0) || varies(r.shear)) return out;
+  std::vector<double> share;
+  try {
+    share = friction_shares(scene, acting_depths(r, found), r.time);
+  } catch (const InputError&) {  // a step of the path failed: nothing is known
+    return out;
+  }
+  out.mu = c.mu;
+  out.largest = peak_of(share) / peak_of(r.force);
+  out.moved = along.moves(share);
+  return out;
+}
+
 /// Returns the largest ratio of shear to normal force, of rows whose normal force counts.
 double largest_ratio(const PressRecording& r) {
   const double least = kSmallest * peak_of(r.force);
@@ -228,10 +283,18 @@ double largest_ratio(const PressRecording& r) {
   return ratio;
 }
 
-/// Runs a fit and adds what it found.
-void add_fit(ForceFit& fit, const std::vector<std::string>& names, const SkinNumbers& start,
-             Calibration& out) {
-  fit.run(names, start, out.found);
+/// Finds what the zeros that are not fitted do. Those that nothing tells widen the intervals,
+/// unless the user chose the numbers.
+void add_given(ForceFit& fit, const Names& names, bool chosen, Calibration& out) {
+  for (const char* const zero : {kZero, kForceZero}) {
+    if (names.normal.empty() || std::ranges::count(names.normal, zero) > 0) continue;
+    out.given.push_back(fit.given(zero));
+    if (!out.given.back().told && !chosen) fit.hold(zero);
+  }
+}
+
+/// Adds what a fit found.
+void add_fit(const ForceFit& fit, Calibration& out) {
   out.found = fit.found();
   out.converged = out.converged && fit.converged();
   for (const FittedNumber& number : fit.numbers()) out.numbers.push_back(number);
@@ -255,14 +318,17 @@ Calibration calibrate(const CalibrationRequest& request, const PressRecording& r
   check(recording);
   Calibration out;
   out.held_out = held_out_rows(request.hold_out, int(recording.rows()));
-  std::vector<int> rows;
+  if (request.start.contains(kRelaxation)) out.turns = recording.turns();
+  std::vector<int>& rows = out.rows;
   for (int row = 0; row < int(recording.rows()); ++row)
-    if (!std::ranges::binary_search(out.held_out, row)) rows.push_back(row);
+    if (!std::ranges::binary_search(out.held_out, row) &&
+        !std::ranges::binary_search(out.turns, row))
+      rows.push_back(row);
   const double depth = *std::ranges::max_element(recording.depth);
   if (request.knots > 0 && !(depth > 0))
     throw InputError(
         fmt::format("a table up to the depth {} m; expected depths positive into the skin", depth));
-  const Names names = choose_numbers(request, recording, int(rows.size()), out.untold);
+  const Names names = choose_numbers(request, recording, rows, out.untold);
   if (!names.shear.empty() && !(peak_of(recording.shear_force) > 0))
     throw InputError("a shear without any force; expected shear forces, or no columns of a shear");
 
@@ -273,21 +339,31 @@ Calibration calibrate(const CalibrationRequest& request, const PressRecording& r
     return normal_forces(request, recording, numbers);
   };
   ForceFit along(press, recording.force, rows, depth, request.knots);
-  add_fit(along, names.normal, start, out);
+  along.run(names.normal, start, out.found, names.held);
+  add_given(along, names, !request.numbers.empty(), out);
+  add_fit(along, out);
+  out.zero_correlation = along.correlation(kZero, kForceZero);
   if (request.knots > 0) out.found[kDepth] = table_depth(depth, out.found);
+  out.rows_above = rows_above(acting_depths(recording, out.found), rows);
   const std::vector<double> normal = normal_forces(request, recording, out.found);
   out.normal = error_of(normal, recording.force, rows);
   out.normal_held_out = error_of(normal, recording.force, out.held_out);
-  if (names.shear.empty()) return out;
+  if (!names.normal.empty()) out.friction = friction_share(request, recording, along, out.found);
+  if (names.shear.empty() && (request.fit || recording.shear.empty())) return out;
 
-  const std::vector<double> depths = acting_depths(recording, out.found);
-  const auto path = [&](const SkinNumbers& numbers) {
-    return shear_forces(request.scene(numbers), depths, recording.shear);
+  const auto path = [&](SkinNumbers numbers) {
+    if (request.knots > 0) numbers[kDepth] = table_depth(depth, numbers);
+    return shear_forces(request.scene(numbers), acting_depths(recording, numbers), recording.shear);
   };
   if (std::ranges::count(names.shear, kFriction) > 0)
     scale_shear_start(path, names.shear, out.found, normal, recording.shear_force, start);
+  SkinNumbers begin = out.found;
+  for (const std::string& name : names.shear) begin[name] = start.at(name);  // none: a score
+  check_shear_sign(path, begin, recording.shear_force);
   ForceFit across(path, recording.shear_force, rows, depth, 0);
-  add_fit(across, names.shear, start, out);
+  across.run(names.shear, start, out.found);
+  across.add_errors_of(along);
+  add_fit(across, out);
   if (std::ranges::count(across.untold(), kFriction, &UntoldNumber::name) > 0)
     out.least_friction = largest_ratio(recording);
   const std::vector<double> shear = path(out.found);
@@ -297,14 +373,14 @@ Calibration calibrate(const CalibrationRequest& request, const PressRecording& r
 }
 
 PressError check_calibration(const CalibrationRequest& request, const SkinNumbers& found,
-                             const PressRecording& recording) {
+                             const PressRecording& recording, std::vector<int> rows) {
   check(recording);
   for (const char* const name : {kLag, kRelaxation})
     if (found.contains(name) && recording.time.empty())
       throw InputError(fmt::format(
           "the other recording has no times, and '{}' was fitted; expected times", name));
-  std::vector<int> rows(recording.rows());
-  for (std::size_t k = 0; k < rows.size(); ++k) rows[k] = int(k);
+  if (rows.empty())
+    for (int k = 0; k < int(recording.rows()); ++k) rows.push_back(k);
   return error_of(normal_forces(request, recording, found), recording.force, rows);
 }
 

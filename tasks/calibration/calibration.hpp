@@ -24,10 +24,13 @@ struct CalibrationRequest {
   /// Pressures of a table, which is fitted in place of a modulus; 0: none.
   int knots = 0;
   /// What is fitted: names out of start, "pressure" (the table), "zero" [m] which is added to every
-  /// depth, "lag" [s] of the force behind the depth, and "slider", a spring [N/m] beside the skin
-  /// that slips at "slider_force" [N]. Empty: all out of start and "zero", or all and "pressure",
-  /// as far as the recording can tell them.
+  /// depth, "force_zero" [N] which the load cell adds to every force, "lag" [s] of the force behind
+  /// the depth, and "slider", a spring [N/m] beside the skin that slips at "slider_force" [N].
+  /// Empty: all out of start and "zero", or all and "pressure", and "force_zero" if rows are above
+  /// the skin, as far as the recording can tell them.
   std::vector<std::string> numbers{};
+  /// Whether anything is fitted if `numbers` is empty.
+  bool fit = true;
   /// Rows that are compared and not fitted, of all; as held_out_rows().
   double hold_out = 0;
 };
@@ -39,10 +42,25 @@ struct PressError {
   double largest_by_row = 0;  ///< over the row's own force, of rows above a twentieth of the peak
 };
 
+/// What friction adds to the normal force of a press, and how far it would move the numbers.
+struct FrictionShare {
+  double mu = 0;                    ///< 0: the sensor has none, or its springs have no memory
+  double largest = 0;               ///< of the normal force, over the largest recorded one
+  std::vector<FittedNumber> moved;  ///< numbers of the normal force without their intervals: shares
+};
+
 struct Calibration {
   std::vector<FittedNumber> numbers;
   std::vector<UntoldNumber> untold;
+  std::vector<GivenNumber> given;  ///< zeros that are not fitted
+  /// Correlation of the errors of "zero" and "force_zero"; none unless both are fitted.
+  std::optional<double> zero_correlation;
+  int rows_above = 0;      ///< of the fitted rows, those above the skin
+  std::vector<int> turns;  ///< rows that are not fitted, because the rate of the depth jumps there
+  /// What the friction of the sensor would do, which the normal force is computed without.
+  FrictionShare friction;
   SkinNumbers found;          ///< all numbers that were fitted, and "table_depth"
+  std::vector<int> rows;      ///< that are fitted
   std::vector<int> held_out;  ///< rows
   PressError normal, normal_held_out, shear, shear_held_out;
   /// Where nothing slips, so that mu is not told: the largest recorded ratio of shear to normal
@@ -61,10 +79,10 @@ std::vector<int> held_out_rows(double hold_out, int rows);
 /// columns cannot tell, and for a table without a positive depth.
 Calibration calibrate(const CalibrationRequest& request, const PressRecording& recording);
 
-/// Compares the normal forces of another recording with those of the numbers that were found.
-/// Throws InputError for columns as calibrate(), and for one without times if a lag or a relaxation
-/// was found.
+/// Compares the normal forces of another recording with those of the numbers that were found, at
+/// `rows` or at all. Throws InputError for columns as calibrate(), and for one without times if a
+/// lag or a relaxation was found.
 PressError check_calibration(const CalibrationRequest& request, const SkinNumbers& found,
-                             const PressRecording& recording);
+                             const PressRecording& recording, std::vector<int> rows = {});
 
 }  // namespace tangere

@@ -21,6 +21,8 @@ std::string reason(const std::string& name) {
   if (name == kRelaxation) return "the rates of the recording do not show it";
   if (name == kShear) return "everything slips";
   if (name == kSliderForce) return "the slider does not slip, so it exceeds the slider's forces";
+  if (name == kForceZero)
+    return "nothing tells it from the zero of the depth; record rows above the skin";
   return "the forces do not change with it";
 }
 
@@ -50,11 +52,13 @@ ForceFit::ForceFit(Forces forces, std::span<const double> recorded, std::vector<
 
 ForceFit::Scale ForceFit::scale_of(const std::string& name, const SkinNumbers& start) const {
   if (name == kZero) return {Scale::Kind::linear, depth_};
+  if (name == kForceZero) return {Scale::Kind::linear, peak_};
   const bool vanishes = name == kRelaxation || name == kLag || is_table_number(name);
   return {vanishes ? Scale::Kind::square : Scale::Kind::exponential, start.at(name)};
 }
 
-void ForceFit::run(std::vector<std::string> names, const SkinNumbers& start, SkinNumbers fixed) {
+void ForceFit::run(std::vector<std::string> names, const SkinNumbers& start, SkinNumbers fixed,
+                   std::vector<std::string> held) {
   for (std::size_t at = 0; at < names.size(); ++at) {
     if (names[at] != kTable) continue;
     names.erase(names.begin() + std::ptrdiff_t(at));
@@ -62,18 +66,20 @@ void ForceFit::run(std::vector<std::string> names, const SkinNumbers& start, Ski
       names.insert(names.begin() + std::ptrdiff_t(at), table_number(k));
   }
   for (;;) {
-    names_ = names;
+    names_ = names, held_ = held;
     fixed_ = fixed;
     scales_.clear();
     for (const std::string& name : names) scales_.push_back(scale_of(name, start));
     if (names.empty()) return;
     found_ = minimise([&](std::span<const double> x) { return residuals(x); },
                       std::vector<double>(names.size(), 1.0));
+    find_confidence();
     const std::size_t weak = weakest();
     if (weak == names.size()) return;
     untold_.push_back({names[weak], reason(names[weak])});
     if (names[weak] == kFriction || names[weak] == kSliderForce)  // so that it stays without slip
       fixed[names[weak]] = scales_[weak].value(found_.x[weak]);
+    if (names[weak] == kForceZero) held.push_back(names[weak]);
     names.erase(names.begin() + std::ptrdiff_t(weak));
   }
 }
@@ -89,12 +95,56 @@ SkinNumbers ForceFit::numbers_at(std::span<const double> x) const {
 }
 
 /// Over the peak, at the rows that are fitted.
-std::vector<double> ForceFit::residuals(std::span<const double> x) const {
-  const std::vector<double> computed = forces_(numbers_at(x));
+std::vector<double> ForceFit::residuals_of(const SkinNumbers& numbers) const {
+  const std::vector<double> computed = forces_(numbers);
   std::vector<double> out;
   for (const int row : rows_)
     out.push_back((computed[std::size_t(row)] - recorded_[std::size_t(row)]) / peak_);
   return out;
+}
+
+std::vector<double> ForceFit::residuals(std::span<const double> x) const {
+  return residuals_of(numbers_at(x));
+}
+
+/// Returns the derivative of the residuals by a zero, in its share of depth or peak.
+std::vector<double> ForceFit::slope_by(const std::string& held) const {
+  return slope_along([&](double s) {
+    SkinNumbers numbers = found();
+    numbers[held] += s * scale_of(held, {}).unit;
+    return residuals_of(numbers);
+  });
+}
+
+/// Returns what was found with a change of fitted number or held one k.
+SkinNumbers ForceFit::moved(std::size_t k, double dx) const {
+  std::vector<double> x = found_.x;
+  if (k < x.size()) x[k] += dx;
+  SkinNumbers out = numbers_at(x);
+  if (k >= x.size()) out[held_[k - x.size()]] += dx * scale_of(held_[k - x.size()], {}).unit;
+  return out;
+}
+
+void ForceFit::find_confidence() {
+  Columns jacobian = found_.jacobian;
+  for (const std::string& name : held_) jacobian.push_back(slope_by(name));
+  double squares = 0;
+  for (const double r : found_.residuals) squares += r * r;
+  confidence_ = Confidence(jacobian, squares);
+}
+
+void ForceFit::add_errors_of(const ForceFit& before) {
+  if (names_.empty() || before.names_.empty()) return;
+  const SkinNumbers own = found();
+  Columns by;
+  for (std::size_t k = 0; k < before.names_.size() + before.held_.size(); ++k)
+    by.push_back(slope_along([&](double s) {
+      SkinNumbers numbers = before.moved(k, s);
+      for (const std::string& name : names_) numbers[name] = own.at(name);
+      for (const auto& [name, value] : own) numbers.try_emplace(name, value);
+      return residuals_of(numbers);
+    }));
+  confidence_.add_errors_of(before.confidence_, by);
 }
 
 /// Whether a friction that is a hundredth larger leaves the forces as they are.
@@ -108,13 +158,15 @@ bool ForceFit::holds(std::size_t friction) const {
   return std::sqrt(squares / double(now.size())) < 0.01 * kLeastSlip;
 }
 
-/// Returns the first number that has no influence, or whose interval goes beyond 0.
+/// Returns the first number that has no influence, or that nothing tells from the others, or whose
+/// interval goes beyond 0.
 std::size_t ForceFit::weakest() const {
   for (std::size_t k = 0; k < names_.size(); ++k) {
     if (is_table_number(names_[k])) continue;
-    if (found_.influence[k] < kLeastInfluence) return k;
+    if (found_.influence(k) < kLeastInfluence) return k;
     if (names_[k] == kFriction && holds(k)) return k;
     if (names_[k] == kRelaxation && !(interval(k).low > 0)) return k;
+    if (names_[k] == kForceZero && confidence_.rank_misses(k)) return k;
   }
   return names_.size();
 }
@@ -129,8 +181,8 @@ FittedNumber ForceFit::interval(std::size_t k) const {
     gradient[j - 1] = scales_[j - 1].slope(found_.x[j - 1]);
     value += scales_[j - 1].value(found_.x[j - 1]);
   }
-  const double half = found_.half_interval(gradient);
-  if (scales_[k].kind == Scale::Kind::exponential)
+  const double half = confidence_.half_interval(gradient);
+  if (scales_[k].kind == Scale::Kind::exponential && std::isfinite(half))
     return {names_[k], value, value * std::exp(-half / value), value * std::exp(half / value)};
   return {names_[k], value, value - half, value + half};
 }
@@ -139,6 +191,53 @@ std::vector<FittedNumber> ForceFit::numbers() const {
   std::vector<FittedNumber> out;
   for (std::size_t k = 0; k < names_.size(); ++k) out.push_back(interval(k));
   return out;
+}
+
+std::vector<FittedNumber> ForceFit::moves(std::span<const double> addition) const {
+  std::vector<double> change;
+  for (const int row : rows_) change.push_back(addition[std::size_t(row)] / peak_);
+  const Confidence answers(found_.jacobian, 0);  // of the fitted numbers alone
+  std::vector<FittedNumber> out;
+  double pressure = 0;
+  for (std::size_t k = 0; k < names_.size(); ++k) {
+    const double moved = scales_[k].slope(found_.x[k]) * answers.answer(k, change);
+    if (is_table_number(names_[k])) pressure += moved;
+    out.push_back({names_[k], is_table_number(names_[k]) ? pressure : moved});
+  }
+  return out;
+}
+
+GivenNumber ForceFit::given(const std::string& name) const {
+  constexpr double kError = 0.01;
+  GivenNumber out{name, kError * scale_of(name, {}).unit, "", 0, true};
+  if (names_.empty()) return out;
+  const std::vector<double> slope = slope_by(name);
+  Columns all = found_.jacobian;
+  all.push_back(slope);
+  out.told = !Confidence(all, 0).rank_misses(all.size() - 1);
+  if (scales_[0].kind == Scale::Kind::linear) return out;
+  std::vector<double> addition(recorded_.size());
+  for (std::size_t k = 0; k < rows_.size(); ++k)
+    addition[std::size_t(rows_[k])] = kError * slope[k] * peak_;
+  // Of a table the last pressure.
+  const std::vector<FittedNumber> moved = moves(addition), values = numbers();
+  std::size_t k = 0;
+  while (k + 1 < names_.size() && is_table_number(names_[k + 1])) ++k;
+  out.moved = names_[k];
+  out.change = moved[k].value / values[k].value;
+  return out;
+}
+
+void ForceFit::hold(const std::string& name) {
+  if (names_.empty() || std::ranges::count(held_, name) > 0) return;
+  held_.push_back(name);
+  find_confidence();
+}
+
+std::optional<double> ForceFit::correlation(const std::string& a, const std::string& b) const {
+  const auto i = std::ranges::find(names_, a), j = std::ranges::find(names_, b);
+  if (i == names_.end() || j == names_.end()) return std::nullopt;
+  return confidence_.correlation(std::size_t(i - names_.begin()), std::size_t(j - names_.begin()));
 }
 
 }  // namespace tangere

@@ -4,6 +4,7 @@
 
 #include <functional>
 #include <map>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -25,11 +26,20 @@ struct FittedNumber {
 struct UntoldNumber {
   std::string name, reason;
 };
+/// A number of the recording that is taken as 0, and what an error of it does.
+struct GivenNumber {
+  std::string name;
+  double error = 0;   ///< a hundredth of the largest depth [m] or force [N]
+  std::string moved;  ///< the number that it moves
+  double change = 0;  ///< by this share
+  bool told = true;   ///< whether the other numbers could not take its place
+};
 
 /// Names of the numbers of a recording.
-inline constexpr const char *kZero = "zero", *kRelaxation = "relaxation", *kShear = "ks",
-                            *kFriction = "mu", *kTable = "pressure", *kLag = "lag",
-                            *kSlider = "slider", *kSliderForce = "slider_force";
+inline constexpr const char *kZero = "zero", *kForceZero = "force_zero",
+                            *kRelaxation = "relaxation", *kShear = "ks", *kFriction = "mu",
+                            *kTable = "pressure", *kLag = "lag", *kSlider = "slider",
+                            *kSliderForce = "slider_force";
 
 /// Returns "pressure[3]", the name of a number of a table.
 std::string table_number(int k);
@@ -45,10 +55,25 @@ class ForceFit {
            int knots);
 
   /// Fits `names` from `start`, with `fixed` numbers. Those that turn out not to be told are listed
-  /// in untold() and left out, so that the fit of the rest is without them.
-  void run(std::vector<std::string> names, const SkinNumbers& start, SkinNumbers fixed);
+  /// in untold() and left out, so that the fit of the rest is without them. `held`: numbers that
+  /// are not fitted because the recording does not tell them. The intervals of the others contain
+  /// that they are not known.
+  void run(std::vector<std::string> names, const SkinNumbers& start, SkinNumbers fixed,
+           std::vector<std::string> held = {});
+  /// Adds the errors of the numbers of an earlier fit, on which these forces depend, to the
+  /// intervals.
+  void add_errors_of(const ForceFit& before);
 
   [[nodiscard]] std::vector<FittedNumber> numbers() const;
+  /// What a zero that is not fitted does. `name`: kZero or kForceZero.
+  [[nodiscard]] GivenNumber given(const std::string& name) const;
+  /// Returns by how much each number moves if the computed forces have an addition [N], of all
+  /// rows; without intervals.
+  [[nodiscard]] std::vector<FittedNumber> moves(std::span<const double> addition) const;
+  /// Holds a zero that is not fitted, as run().
+  void hold(const std::string& name);
+  /// Correlation of the errors of two numbers; none unless both are fitted.
+  [[nodiscard]] std::optional<double> correlation(const std::string& a, const std::string& b) const;
   [[nodiscard]] const std::vector<UntoldNumber>& untold() const { return untold_; }
   /// All numbers of the fit, the fixed ones included.
   [[nodiscard]] SkinNumbers found() const { return numbers_at(found_.x); }
@@ -64,8 +89,12 @@ class ForceFit {
   };
   [[nodiscard]] Scale scale_of(const std::string& name, const SkinNumbers& start) const;
   [[nodiscard]] SkinNumbers numbers_at(std::span<const double> x) const;
+  [[nodiscard]] std::vector<double> residuals_of(const SkinNumbers& numbers) const;
   [[nodiscard]] std::vector<double> residuals(std::span<const double> x) const;
+  [[nodiscard]] std::vector<double> slope_by(const std::string& held) const;
+  [[nodiscard]] SkinNumbers moved(std::size_t number, double dx) const;
   [[nodiscard]] bool holds(std::size_t friction) const;
+  void find_confidence();
   [[nodiscard]] std::size_t weakest() const;
   [[nodiscard]] FittedNumber interval(std::size_t k) const;
 
@@ -75,9 +104,11 @@ class ForceFit {
   double peak_, depth_;
   int knots_;
   std::vector<std::string> names_;  // of a table: of its increments
+  std::vector<std::string> held_;
   SkinNumbers fixed_;
   std::vector<Scale> scales_;
   LeastSquares found_;
+  Confidence confidence_;  // of names_ and then held_
   std::vector<UntoldNumber> untold_;
 };
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The method is that of Eigen. With J = ∂r/∂x at the minimum and n numbers of m residuals, the
-// covariance of x is s² (JᵀJ)⁻¹, s² = Σ r²/(m - n).
+// The method is that of Eigen. With J = ∂r/∂x and its columns scaled to a norm of 1, the modes of
+// JᵀJ whose eigenvalue is above rounding are told. Errors of numbers y that were found before move
+// x by -(JᵀJ)⁻¹ Jᵀ ∂r/∂y.
 #include "tasks/calibration/least_squares.hpp"
 
 #include <Eigen/Eigenvalues>
@@ -16,7 +17,9 @@ using Vector = Eigen::VectorXd;
 using Matrix = Eigen::MatrixXd;
 
 constexpr double kDifference = 1e-10;  // relative error of the residuals, of which steps are roots
+constexpr double kLineStep = 5e-4;     // the third root of kDifference
 constexpr double kWeakest = 1e-9;      // eigenvalue of normalised columns that is an error
+constexpr double kUntoldShare = 1e-3;  // of a number, along what is not told
 constexpr Eigen::Index kMostPasses = 200;
 
 struct Problem {
@@ -39,24 +42,15 @@ struct Problem {
 };
 using Differences = Eigen::NumericalDiff<Problem, Eigen::Central>;
 
-/// Fills in covariance and influences from the Jacobian at the minimum.
-void judge(const Matrix& J, double squares, LeastSquares& out) {
-  const Eigen::Index n = J.cols(), freedom = J.rows() - n;
-  Vector size(n);
-  for (Eigen::Index k = 0; k < n; ++k) {
-    size[k] = J.col(k).norm();
-    out.influence.push_back(size[k] / std::sqrt(double(J.rows())));
-  }
-  if (freedom < 1 || !(size.minCoeff() > 0)) return;
-  const Matrix scaled = J * size.cwiseInverse().asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Matrix> modes(scaled.transpose().lazyProduct(scaled));
-  if (modes.eigenvalues()[0] < kWeakest) return;
-  const Matrix axes = size.cwiseInverse().asDiagonal() * modes.eigenvectors(),
-               shares = axes * modes.eigenvalues().cwiseInverse().asDiagonal();
-  const Matrix covariance = squares / double(freedom) * shares.lazyProduct(axes.transpose());
-  out.covariance.assign(covariance.data(), covariance.data() + covariance.size());
-  out.student = student_95(int(freedom));
+std::vector<double> numbers_of(const Vector& v) { return {v.data(), v.data() + v.size()}; }
+
+double dot(std::span<const double> a, std::span<const double> b) {
+  double sum = 0;
+  for (std::size_t k = 0; k < std::min(a.size(), b.size()); ++k) sum += a[k] * b[k];
+  return sum;
 }
+
+double norm(std::span<const double> a) { return std::sqrt(dot(a, a)); }
 
 }  // namespace
 
@@ -70,23 +64,112 @@ LeastSquares minimise(const Residuals& residuals, std::vector<double> x) {
   using Status = Eigen::LevenbergMarquardtSpace::Status;
   const Status status = method.minimize(at);
   LeastSquares out;
-  out.x.assign(at.data(), at.data() + n);
+  out.x = numbers_of(at);
   out.converged = status != Status::TooManyFunctionEvaluation &&
                   status != Status::ImproperInputParameters && at.allFinite();
   Vector r(m);
   Matrix J(m, n);
   problem(at, r);
   problem.df(at, J);
-  judge(J, r.squaredNorm(), out);
+  out.residuals = numbers_of(r);
+  for (Eigen::Index k = 0; k < n; ++k) out.jacobian.push_back(numbers_of(J.col(k)));
   return out;
 }
 
-double LeastSquares::half_interval(std::span<const double> gradient) const {
-  if (covariance.empty()) return HUGE_VAL;
-  const auto n = Eigen::Index(x.size());
-  const Eigen::Map<const Matrix> C(covariance.data(), n, n);
-  const Eigen::Map<const Vector> g(gradient.data(), n);
-  return student * std::sqrt(g.dot(C * g));
+double LeastSquares::influence(std::size_t k) const {
+  return norm(jacobian[k]) / std::sqrt(double(residuals.size()));
+}
+
+std::vector<double> slope_along(const std::function<std::vector<double>(double)>& residuals) {
+  const std::vector<double> before = residuals(-kLineStep);
+  std::vector<double> out = residuals(kLineStep);
+  for (std::size_t k = 0; k < out.size(); ++k) out[k] = (out[k] - before[k]) / (2 * kLineStep);
+  return out;
+}
+
+Confidence::Confidence(const Columns& jacobian, double squares) : jacobian_(jacobian) {
+  const auto n = Eigen::Index(jacobian.size());
+  if (n == 0) return;
+  const auto m = Eigen::Index(jacobian[0].size());
+  missing_.assign(jacobian.size(), 0);
+  Matrix J(m, n);
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const std::vector<double>& column = jacobian[std::size_t(k)];
+    size_.push_back(norm(column));
+    if (!(size_.back() > 0)) size_.back() = 1;  // not told
+    J.col(k) = Eigen::Map<const Vector>(column.data(), m) / size_.back();
+  }
+  const Eigen::SelfAdjointEigenSolver<Matrix> modes(J.transpose().lazyProduct(J));
+  const Vector& strength = modes.eigenvalues();
+  const auto rank = std::ranges::count_if(strength, [](double s) { return s >= kWeakest; });
+  const Eigen::Index freedom = m - rank;
+  const double error =
+      freedom > 0 ? student_95(int(freedom)) * std::sqrt(squares / double(freedom)) : 0;
+  const Vector scale = Eigen::Map<const Vector>(size_.data(), n).cwiseInverse();
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const Vector direction = scale.cwiseProduct(modes.eigenvectors().col(k));
+    if (strength[k] < kWeakest) {
+      untold_.push_back(numbers_of(direction));
+      for (Eigen::Index j = 0; j < n; ++j)
+        missing_[std::size_t(j)] = std::hypot(missing_[std::size_t(j)], modes.eigenvectors()(j, k));
+      continue;
+    }
+    const double deviation = 1 / std::sqrt(strength[k]);
+    solver_.push_back(numbers_of(direction * deviation));
+    if (freedom > 0)
+      spread_.push_back(numbers_of(direction * deviation * error));
+    else
+      untold_.push_back(numbers_of(direction));
+  }
+}
+
+double Confidence::answer(std::size_t k, std::span<const double> change) const {
+  double sum = 0;
+  for (const std::vector<double>& direction : solver_) {
+    double both = 0;
+    for (std::size_t j = 0; j < jacobian_.size(); ++j)
+      both += direction[j] * dot(jacobian_[j], change);
+    sum -= direction[k] * both;
+  }
+  return sum;
+}
+
+void Confidence::add_errors_of(const Confidence& before, const Columns& by) {
+  const auto moved = [&](const std::vector<double>& direction) {
+    std::vector<double> change(by.empty() ? 0 : by[0].size()), out;
+    for (std::size_t j = 0; j < by.size(); ++j)
+      for (std::size_t row = 0; row < change.size(); ++row)
+        change[row] += direction[j] * by[j][row];
+    for (std::size_t k = 0; k < size_.size(); ++k) out.push_back(answer(k, change));
+    return out;
+  };
+  for (const std::vector<double>& direction : before.spread_) spread_.push_back(moved(direction));
+  for (const std::vector<double>& direction : before.untold_) untold_.push_back(moved(direction));
+}
+
+double Confidence::half_interval(std::span<const double> gradient) const {
+  double least = 0;
+  for (std::size_t k = 0; k < std::min(gradient.size(), size_.size()); ++k)
+    least += std::pow(gradient[k] / size_[k], 2);
+  least = kUntoldShare * std::sqrt(least);
+  for (const std::vector<double>& direction : untold_)
+    if (std::abs(dot(gradient, direction)) > least) return HUGE_VAL;
+  double squares = 0;
+  for (const std::vector<double>& direction : spread_)
+    squares += std::pow(dot(gradient, direction), 2);
+  return std::sqrt(squares);
+}
+
+bool Confidence::rank_misses(std::size_t k) const { return missing_[k] > kUntoldShare; }
+
+double Confidence::correlation(std::size_t a, std::size_t b) const {
+  if (rank_misses(a) && rank_misses(b)) return 1;
+  double both = 0, aa = 0, bb = 0;
+  for (const std::vector<double>& direction : solver_) {
+    both += direction[a] * direction[b];
+    aa += direction[a] * direction[a], bb += direction[b] * direction[b];
+  }
+  return both / std::sqrt(aa * bb);
 }
 
 double student_95(int freedom) {

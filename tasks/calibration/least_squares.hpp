@@ -11,25 +11,57 @@ namespace tangere {
 /// Computes the residuals, of one length at all x.
 using Residuals = std::function<std::vector<double>(std::span<const double> x)>;
 
+/// A matrix as its columns, of one length.
+using Columns = std::vector<std::vector<double>>;
+
 struct LeastSquares {
   std::vector<double> x;
-  /// (n, n) covariance of x. Empty without more residuals than numbers, or where the residuals do
-  /// not tell the numbers from each other.
-  std::vector<double> covariance;
-  /// Of Student's distribution with as many degrees of freedom as there are more residuals than
-  /// numbers: t with P(|T| ≤ t) = 0.95.
-  double student = 0;
-  /// Root mean square change of the residuals by a unit of each number.
-  std::vector<double> influence;
+  std::vector<double> residuals;  ///< at x
+  Columns jacobian;               ///< of the residuals by each number, at x
   bool converged = false;
 
-  /// Returns half of the 95 % interval of a number that changes by `gradient` · dx; infinite where
-  /// it is not known.
-  [[nodiscard]] double half_interval(std::span<const double> gradient) const;
+  /// Returns the root mean square change of the residuals by a unit of number k.
+  [[nodiscard]] double influence(std::size_t k) const;
 };
 
 /// Minimises Σ r² from `x`. Derivatives are central differences, in shares of x.
 LeastSquares minimise(const Residuals& residuals, std::vector<double> x);
+
+/// Returns the derivative of the residuals along a line x + s direction at s = 0, by central
+/// differences.
+std::vector<double> slope_along(const std::function<std::vector<double>(double s)>& residuals);
+
+/// What residuals r with the Jacobian J tell of numbers x. Gauss and Newton's covariance is
+/// s² (JᵀJ)⁻¹ with s² = Σ r²/(m - rank J), on the directions of x that change the residuals. The
+/// others are not told, and none is without more residuals than that rank.
+class Confidence {
+ public:
+  Confidence() = default;
+  /// `squares`: Σ r².
+  Confidence(const Columns& jacobian, double squares);
+
+  /// Adds the errors of numbers y that were found before, with the confidence `before`. `by`: the
+  /// derivatives of the residuals by y.
+  void add_errors_of(const Confidence& before, const Columns& by);
+
+  /// Returns half of the 95 % interval of a number that changes by `gradient` · dx; infinite where
+  /// it is not told. A shorter gradient goes on with zeros.
+  [[nodiscard]] double half_interval(std::span<const double> gradient) const;
+  /// Correlation of the errors of two numbers; 1 where only their sum or difference is told.
+  [[nodiscard]] double correlation(std::size_t a, std::size_t b) const;
+  /// Returns how far number k goes to keep the residuals least, by a `change` of them.
+  [[nodiscard]] double answer(std::size_t k, std::span<const double> change) const;
+  /// Whether number k has a share in a direction that does not change the residuals.
+  [[nodiscard]] bool rank_misses(std::size_t k) const;
+
+ private:
+  std::vector<double> size_;  ///< norms of the columns of J
+  Columns jacobian_;
+  Columns spread_;  ///< 95 % intervals along independent directions of x
+  Columns untold_;  ///< directions of x whose residuals change by no more than rounding
+  Columns solver_;  ///< the sum of s sᵀ is (JᵀJ)⁻¹ on the told directions
+  std::vector<double> missing_;  ///< shares of the numbers in the other directions, 0 to 1
+};
 
 /// Returns t with P(|T| ≤ t) = 0.95 for Student's distribution with `freedom` ≥ 1 degrees of
 /// freedom, to 0.3 %.

@@ -55,6 +55,21 @@ std::vector<double> PressRecording::rates() const {
   return out;
 }
 
+std::vector<int> PressRecording::turns() const {
+  constexpr double kJump = 0.5, kMostTurns = 0.2;
+  double largest = 0;
+  std::vector<double> rate;  // from each row to the next
+  for (std::size_t k = 1; k < time.size(); ++k) {
+    rate.push_back((depth[k] - depth[k - 1]) / (time[k] - time[k - 1]));
+    largest = std::max(largest, std::abs(rate.back()));
+  }
+  std::vector<int> out;
+  for (std::size_t k = 1; k < rate.size(); ++k)
+    if (std::abs(rate[k] - rate[k - 1]) > kJump * largest) out.push_back(int(k));
+  if (double(out.size()) > kMostTurns * double(rows())) out.clear();
+  return out;
+}
+
 Scene placed_indenter(const Scene& scene) {
   Vector3 low{HUGE_VAL, HUGE_VAL, HUGE_VAL}, high{-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
   for (const TactilePoint& p : tactile_points(scene.sensors.at(0)))
@@ -102,6 +117,24 @@ std::vector<double> shear_forces(const Scene& scene, std::span<const double> dep
   std::vector<double> out;
   drive(model, depth, shear,
         [&](const Batch& batch) { out.push_back(force_on_skin(readout, batch)[0]); });
+  return out;
+}
+
+std::vector<double> friction_shares(const Scene& scene, std::span<const double> depth,
+                                    std::span<const double> time) {
+  const bool timed = time.size() > 1;
+  Scene sticky = timed ? scene : without_rates(scene);
+  if (timed) sticky.timestep = (time.back() - time.front()) / double(time.size() - 1);
+  const Model model(sticky);
+  Readout readout(model);
+  std::vector<double> out, straight(depth.size()), rate(depth.size());
+  drive(model, depth, straight,
+        [&](const Batch& batch) { out.push_back(-force_on_skin(readout, batch)[2]); });
+  for (std::size_t k = 1; k < depth.size() && timed; ++k)
+    rate[k] = (depth[k] - depth[k - 1]) / sticky.timestep;
+  const std::vector<double> smooth = press_forces(sticky, depth, rate);
+  for (std::size_t k = 0; k < out.size(); ++k) out[k] -= smooth[k];
+  if (timed) out[0] = 0;  // whose rate is that from above the skin
   return out;
 }
 

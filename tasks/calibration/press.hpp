@@ -21,6 +21,9 @@ struct PressRecording {
   [[nodiscard]] std::size_t rows() const { return depth.size(); }
   /// Returns the rate of the depth [m/s] by differences between neighbours; zeros without times.
   [[nodiscard]] std::vector<double> rates() const;
+  /// Returns the rows at which the rate jumps by more than half of its largest size, so that it is
+  /// not known there; none without times, and none where more than a fifth of the rows would be.
+  [[nodiscard]] std::vector<int> turns() const;
 };
 
 /// Returns the scene with its indenter above the middle of the skin, at the depth 0. `scene`: link
@@ -38,6 +41,12 @@ std::vector<double> press_forces(const Scene& scene, std::span<const double> dep
 /// position motor at the joint. Throws InputError for a step that fails, with its row.
 std::vector<double> shear_forces(const Scene& scene, std::span<const double> depth,
                                  std::span<const double> shear);
+
+/// Computes how much the friction of the sensor adds to the force along the normal at each row of a
+/// path without shear [N]. `time`: of the rows, taken as evenly spaced [s]; empty: forces by rates
+/// are left out. Throws as shear_forces().
+std::vector<double> friction_shares(const Scene& scene, std::span<const double> depth,
+                                    std::span<const double> time);
 
 /// Returns the scene with its sensor's forces by rates left out.
 Scene without_rates(const Scene& scene);

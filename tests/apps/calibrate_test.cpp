@@ -12,6 +12,7 @@
 #include <sstream>
 
 #include "io/files/png_file.hpp"
+#include "tests/apps/press_recordings.hpp"
 #include "tests/apps/program.hpp"
 
 namespace tangere::apps {
@@ -21,43 +22,6 @@ using nlohmann::json;
 using ::testing::EndsWith;
 using ::testing::HasSubstr;
 using ::testing::Not;
-
-constexpr double kPoints = 37;  // of a pitch of 1 mm within 3.5 mm
-constexpr double kArea = 1e-6;  // of a point [m²]
-constexpr double kThickness = 4e-3;
-
-/// 11 x 11 points. `more`: attributes.
-std::string layout(const std::string& more) {
-  return "<sensor unit=\"m-kg\"><tactile name=\"skin_guess\" type=\"rect_array\" resolution=\"11 "
-         "11\" "
-         "rect_pos0=\"-0.005 0.005 0\" rect_pos1=\"0.005 -0.005 0\" axis0=\"0 -1 0\" axis1=\"1 0 "
-         "0\" " +
-         more + "/></sensor>";
-}
-
-/// Rows of a table whose columns follow from the row.
-std::string table(const std::string& header, int rows,
-                  const std::function<std::vector<double>(int)>& row) {
-  std::ostringstream text;
-  text << std::setprecision(17) << header << "\n";
-  for (int k = 0; k < rows; ++k) {
-    const char* between = "";
-    for (const double x : row(k)) text << between << x, between = ",";
-    text << "\n";
-  }
-  return text.str();
-}
-
-json number(const json& answer, const std::string& name) {
-  for (const json& n : answer["numbers"])
-    if (n["number"] == name) return n;
-  return {};
-}
-std::string reason(const json& answer, const std::string& name) {
-  for (const json& n : answer["untold"])
-    if (n["number"] == name) return n["reason"];
-  return "told";
-}
 
 TEST(Calibrate, StiffnessAndZeroOfAPressAreFound) {
   const Folder folder;
@@ -502,8 +466,6 @@ TEST(Calibrate, SaysWhatIsWrong) {
   folder.write("skin.xml", layout("kn=\"50\""));
   EXPECT_THAT(err("depth,force\n-1e-4,1\n-2e-4,2\n", flat + Words{"--table", "3"}),
               HasSubstr("expected depths positive into the skin"));
-  folder.write("skin.xml", layout("pressure_depth=\"0 1e-3\" pressure=\"0 1e4\""));
-  EXPECT_THAT(err(kTable, flat), HasSubstr("has a table of pressures; expected --table"));
   folder.write("skin.xml",
                "<sensor unit=\"m-kg\"><tactile type=\"hemisphere\" radius=\"0.01\" count=\"50\" "
                "modulus=\"1e5\" thickness=\"3e-3\"/></sensor>");

@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: Apache-2.0
+// A ball of radius R that is d deep cuts the surface in a circle of radius √(2 R d - d²). On a
+// layer it touches within about √(R d), and cells of side h make its force about 0.09 h/√(R d) too
+// large (docs/layer.md).
+#include "tasks/calibration/press_doubts.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+namespace tangere {
+namespace {
+
+constexpr double kLargestBall = 0.1, kSmallestBall = 1e-4;  // radius [m]
+constexpr double kLargestByPad = 3;                         // radius, by the pad's longer side
+constexpr double kDeepestPress = 0.05, kShallowest = 5e-6;  // [m], without a thickness
+constexpr double kFastestPress = 2;                         // [m/s]
+constexpr double kLeastModulus = 5e3, kMostModulus = 2e7;   // of skins [Pa]
+constexpr double kSoftest = 5e5, kStiffest = 5e10;          // by area, without a thickness [N/m³]
+constexpr double kFilm = 2.3;                               // kn t/E of a film (docs/skin.md)
+constexpr double kCellError = 0.09, kMostCellError = 0.03;  // h/√(R d) has this error of a force
+constexpr int kFewestPoints = 9;
+constexpr double kUsualLayerCell = 0.2;  // of a layer, by the thickness
+
+/// "; 0.0075 if it is in mm".
+std::string factor_text(double value, double factor, const char* what) {
+  return fmt::format("; {:.3g} if {}", value * factor, what);
+}
+
+std::optional<double> ball_of(const Scene& scene) {
+  const auto* const ball = std::get_if<SphereShape>(&scene.links.at(1).body.shape);
+  return ball == nullptr ? std::nullopt : std::optional(ball->radius);
+}
+
+std::optional<double> thickness_of(const TactileDescription& d) {
+  if (d.material) return d.material->thickness;
+  if (d.table && d.table->thickness > 0) return d.table->thickness;
+  return std::nullopt;
+}
+
+/// Distance of neighbouring points of an array, the mean of both axes; 0 for one point [m].
+double mean_pitch(const RectArray& array) {
+  std::vector<double> found;
+  for (const auto& [axis, n] : {std::pair{&array.axis0, array.rows}, {&array.axis1, array.cols}}) {
+    double length = 0;
+    for (std::size_t i = 0; i < 3; ++i)
+      length += (*axis)[i] * (array.corner1[i] - array.corner0[i]);
+    if (n > 1) found.push_back(std::abs(length) / (n - 1));
+  }
+  return found.empty() ? 0 : std::sqrt(found.front() * found.back());
+}
+
+/// Points of the skin from the indenter's axis, and the longer side of the pad [m].
+struct Places {
+  std::vector<double> distance;
+  double side = 0;
+};
+Places places_of(const Scene& scene) {
+  const Vector3& axis = scene.links.at(1).joint.pose.position;
+  Vector3 low{HUGE_VAL, HUGE_VAL, 0}, high{-HUGE_VAL, -HUGE_VAL, 0};
+  Places out;
+  for (const TactilePoint& point : tactile_points(scene.sensors.at(0))) {
+    const Vector3& p = point.position;
+    for (std::size_t i = 0; i < 2; ++i)
+      low[i] = std::min(low[i], p[i]), high[i] = std::max(high[i], p[i]);
+    out.distance.push_back(std::hypot(p[0] - axis[0], p[1] - axis[1]));
+  }
+  std::ranges::sort(out.distance);
+  out.side = std::max(high[0] - low[0], high[1] - low[1]);
+  return out;
+}
+
+double cut_radius(double ball, double depth) {
+  return depth < ball ? std::sqrt(depth * (2 * ball - depth)) : ball;
+}
+
+void doubt_ball(double ball, const Places& places, std::vector<std::string>& out) {
+  if (ball > kLargestBall || (places.side > 0 && ball > kLargestByPad * places.side))
+    out.push_back(fmt::format(
+        "a ball of radius {:.4g} m on a pad of {:.3g} m; expected metres, {:.3g} "
+        "at most{}",
+        ball, places.side,
+        places.side > 0 ? std::min(kLargestBall, kLargestByPad * places.side) : kLargestBall,
+        factor_text(ball, 1e-3, "it is in mm")));
+  if (ball < kSmallestBall)
+    out.push_back(fmt::format("a ball of radius {:.4g} m; expected metres, {:.3g} at least{}", ball,
+                              kSmallestBall, factor_text(ball, 1e3, "it was divided by 1000")));
+}
+
+void doubt_depth(double depth, std::optional<double> thickness, std::vector<std::string>& out) {
+  const double most = thickness.value_or(kDeepestPress);
+  if (depth > most)
+    out.push_back(fmt::format(
+        "a depth of {:.4g} m {}; expected metres, positive into the skin, {:.3g} at most{}", depth,
+        thickness ? "in a skin that ends at its thickness" : "in a skin", most,
+        depth * 1e-3 < most ? factor_text(depth, 1e-3, "the column is in mm: name it depth_mm")
+                            : ""));
+  if (depth > 0 && depth < kShallowest)
+    out.push_back(fmt::format("a largest depth of {:.3g} m; expected {:.3g} at least{}", depth,
+                              kShallowest,
+                              factor_text(depth, 1e3, "the column is in m: name it depth_m")));
+}
+
+void doubt_speed(const PressRecording& r, std::vector<std::string>& out) {
+  double fastest = 0;
+  for (const double rate : r.rates()) fastest = std::max(fastest, std::abs(rate));
+  if (fastest > kFastestPress)
+    out.push_back(fmt::format(
+        "a speed of {:.3g} m/s; expected times in s, and {:.3g} m/s at "
+        "most{}",
+        fastest, kFastestPress, factor_text(fastest, 1e-3, "times or depths are 1000 times off")));
+}
+
+/// Whether points and cells are fine enough for the deepest row.
+void doubt_resolution(const TactileDescription& d, double ball, double depth, const Places& places,
+                      std::vector<std::string>& out) {
+  if (!(depth > 0)) return;
+  const double radius = cut_radius(ball, depth);
+  const auto points = std::ranges::count_if(places.distance, [&](double x) { return x < radius; });
+  if (points > 0 && points < kFewestPoints)
+    out.push_back(fmt::format(
+        "the ball touches {} point{} at its largest depth, {:.3g} m, where its contact has a "
+        "radius "
+        "of {:.3g} m; the force depends on where it stands between the points: expected {} points, "
+        "or a larger ball",
+        points, points == 1 ? "" : "s", depth, radius, kFewestPoints));
+  if (!d.layer) return;
+  const double pitch = mean_pitch(d.array),
+               size = d.layer->cell > 0 ? d.layer->cell : kUsualLayerCell * d.material->thickness,
+               cell = pitch * std::max(1.0, std::round(size / pitch)),
+               touched = std::sqrt(ball * depth), error = kCellError * cell / touched;
+  if (error > kMostCellError)
+    out.push_back(fmt::format(
+        "the cells of the layer, {:.3g} m, are coarse for a contact of {:.3g} m: its forces are "
+        "about "
+        "{:.0f} % too large at the deepest row, and so much the modulus is too small; expected "
+        "<layer cell=\"{:.2g}\"/> at most, with points as close",
+        cell, touched, 100 * error, kMostCellError * touched / kCellError));
+}
+
+}  // namespace
+
+std::vector<std::string> doubts_of_press(const Scene& scene, const PressRecording& r) {
+  std::vector<std::string> out;
+  const Places places = places_of(scene);
+  const std::optional<double> ball = ball_of(scene);
+  const double depth = r.rows() > 0 ? *std::ranges::max_element(r.depth) : 0;
+  if (ball) doubt_ball(*ball, places, out);
+  doubt_depth(depth, thickness_of(scene.sensors[0]), out);
+  doubt_speed(r, out);
+  if (ball && out.empty()) doubt_resolution(scene.sensors[0], *ball, depth, places, out);
+  return out;
+}
+
+std::vector<std::string> doubts_of_skin(const Scene& scene) {
+  const TactileDescription& d = scene.sensors.at(0);
+  const std::optional<double> thickness = thickness_of(d);
+  double area = d.cell;
+  if (!(area > 0) && d.points.empty()) area = std::pow(mean_pitch(d.array), 2);
+  const bool elastic = d.layer && d.material;
+  if (!elastic && !d.table && !(area > 0)) return {};
+  const double kn = d.table   ? d.table->stiffness()
+                    : elastic ? 0
+                              : d.coefficients.kn / area,
+               value = elastic     ? d.material->modulus
+                       : thickness ? kn * *thickness / kFilm
+                                   : kn;
+  const bool modulus = elastic || thickness;
+  const double low = modulus ? kLeastModulus : kSoftest, high = modulus ? kMostModulus : kStiffest;
+  if (value >= low && value <= high) return {};
+  const double factor = value > high ? 1e-3 : 1e3, other = value * factor;
+  std::string text =
+      fmt::format("a skin of {:.3g} {}; expected {:.0e} to {:.0e}", value,
+                  modulus ? "Pa (Young's modulus)" : "N/m³ (stiffness by area)", low, high);
+  if (other >= low && other <= high)
+    text += fmt::format("; {:.3g} if forces are {}", other,
+                        factor < 1 ? "in mN: name the column force_mN"
+                                   : "in kN, or were divided by "
+                                     "1000");
+  return {text};
+}
+
+std::string why_no_touch(const Scene& scene, double depth) {
+  const Places places = places_of(scene);
+  const std::optional<double> ball = ball_of(scene);
+  if (!ball || !(depth > 0) || places.distance.empty()) return "";
+  const double radius = cut_radius(*ball, depth);
+  if (places.distance[0] < radius) return "";
+  return fmt::format(
+      "the ball's contact has a radius of {:.3g} m at the largest depth, {:.3g} m, and "
+      "the nearest point is {:.3g} m from its axis: it falls between the points",
+      radius, depth, places.distance[0]);
+}
+
+}  // namespace tangere
