@@ -5,9 +5,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
+#include <iterator>
 
 #include "io/files/text_file.hpp"
+#include "io/scene/scene_folders.hpp"
 #include "io/scene/xml_document.hpp"
 
 namespace tangere {
@@ -61,6 +64,18 @@ void check_units(const SceneNode& include, const tinyxml2::XMLElement& element,
   }
 }
 
+/// Returns the path of the file that an <include> names.
+std::string path_of(const SceneNode& include) {
+  SceneContext& context = include.context();
+  std::vector<fs::path> folders{fs::path(context.file).parent_path()};
+  std::ranges::copy(context.outermost().folders, std::back_inserter(folders));
+  try {
+    return find_scene_file(include.text("file"), folders);
+  } catch (const IoError& e) {
+    throw IoError(include.source().prefix() + "<include>: " + e.what());
+  }
+}
+
 }  // namespace
 
 bool same_file(const std::string& a, const std::string& b) {
@@ -71,8 +86,7 @@ bool same_file(const std::string& a, const std::string& b) {
 
 const IncludedFile& include_file(const SceneNode& include, const SceneNode& parent) {
   SceneContext& outer = include.context();
-  const std::string path =
-      (fs::path(outer.file).parent_path() / include.text("file")).lexically_normal().string();
+  const std::string path = path_of(include);
   refuse_rings(include, path);
   auto& all = outer.outermost().included;
   if (all.size() >= kMostFiles)

@@ -23,7 +23,8 @@ struct IncludedFile {
   std::unique_ptr<SceneContext> context;  ///< its own units and defaults
 };
 
-/// Reads the file that `include`, a child of `parent`, names beside the file in which it stands.
+/// Reads the file that `include`, a child of `parent`, names: beside the file in which it stands,
+/// or in the first of the folders of the outermost context that has it.
 /// The file's root has the name of `parent`. Throws InputError at the <include> for a ring of
 /// files, for too many of them, and for attributes with numbers where the two files differ in their
 /// unit; IoError if the file cannot be read. The file lives as long as the outermost context.

@@ -5,6 +5,7 @@
 #include <tinyxml2.h>
 
 #include <array>
+#include <filesystem>
 #include <map>
 #include <memory>
 #include <optional>
@@ -38,6 +39,8 @@ struct SceneContext {
 
   double length = 1;  ///< factor to metres
   void use_centimetres_and_grams();
+  /// Where files of <include> are searched that are not beside theirs; of the outermost context.
+  std::vector<std::filesystem::path> folders = {};
   /// The file whose <include> names this one; nullptr for the file that the user names.
   SceneContext* includer = nullptr;
   /// Files that <include> has brought in, in the context of the user's file. Elements refer to

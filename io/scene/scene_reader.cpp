@@ -13,6 +13,7 @@
 #include "io/files/nearest_name.hpp"
 #include "io/files/text_file.hpp"
 #include "io/scene/scene_cameras.hpp"
+#include "io/scene/scene_folders.hpp"
 #include "io/scene/scene_sections.hpp"
 #include "io/scene/scene_warnings.hpp"
 #include "io/scene/unlike_skins.hpp"
@@ -278,6 +279,9 @@ SceneFile parse_scene(const std::string& text, const std::string& name,
   context.file = name;
   context.allow_unknown = options.allow_unknown;
   context.origins = options.origins;
+  context.folders = options.folders;
+  static const std::vector<std::filesystem::path> kShipped = shipped_scenes();
+  context.folders.insert(context.folders.end(), kShipped.begin(), kShipped.end());
   const tinyxml2::XMLElement& root = parse_xml(document, text, name, kSceneRoots, context.warnings);
   SceneFile out;
   read_root(SceneNode(root, context), out.scene);

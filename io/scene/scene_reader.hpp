@@ -17,6 +17,9 @@ struct SceneReadOptions {
   /// Of text that a program made: where each of its lines comes from, for messages. Empty: from
   /// the text itself.
   std::vector<Source> origins{};
+  /// Where files of <include> are searched that are not beside the file that names them, before the
+  /// scenes that come with the program (io/scene/scene_folders.hpp).
+  std::vector<std::filesystem::path> folders{};
 };
 
 struct SceneFile {

@@ -32,6 +32,11 @@ if(NOT output MATCHES "peak normal tactile force: [0-9.e+-]+ N")
   message(FATAL_ERROR "the consumer printed something else:\n${output}")
 endif()
 run(${prefix}/bin/tangere --help)
+# A scene elsewhere includes a layout that was installed.
+file(WRITE ${WORK}/elsewhere.xml "<tangere><option unit=\"m-kg\"/><robot><link name=\"a\"><joint name=\"a\" "
+  "type=\"fixed\"/><body name=\"a\" type=\"sphere\" radius=\"0.01\"/></link></robot>"
+  "<sensor><include file=\"sensors/digit_guess.xml\" body=\"a\"/></sensor></tangere>")
+run(${prefix}/bin/tangere inspect ${WORK}/elsewhere.xml)
 
 # The command with a task of another program.
 run(${CMAKE_COMMAND} -S ${SOURCE}/examples/own_task -B ${WORK}/own_task -G ${GENERATOR}

@@ -141,6 +141,45 @@ TEST(SceneInclude, AttributesGoToWhatIsIncluded) {
       HasSubstr("kn=\"2\": this file is in m-kg and b.xml in cm-g; expected the same unit"));
 }
 
+/// A file beside the scene comes before one of the same name in the folders; a file in neither is
+/// an error that names the places.
+TEST(SceneInclude, FilesAreAlsoFoundInFolders) {
+  const testing::Folder folder;
+  const std::filesystem::path here = folder.path(), library = here / "library";
+  std::filesystem::create_directories(library / "parts");
+  const auto write = [](const std::filesystem::path& path, const std::string& link) {
+    std::string text = metric_scene(kSlider);
+    for (const char* const name : {"link name=\"a", "joint name=\"a", "body name=\"a"}) {
+      const std::string from = name;
+      text.replace(text.find(from), from.size(), from.substr(0, from.size() - 1) + link);
+    }
+    std::ofstream(path) << text;
+  };
+  const std::string scene = metric_scene("<include file=\"parts/ball.xml\"/>");
+  const auto body = [&](const std::string& text) {
+    const SceneFile file =
+        parse_scene(text, (here / "a.xml").string(), {.folders = {here / "none", library}});
+    return file.scene.links.at(0).name;
+  };
+  const auto fault = [&](const std::string& text) -> std::string {
+    try {
+      return body(text);
+    } catch (const IoError& e) {
+      return e.what();
+    }
+  };
+  EXPECT_THAT(fault(scene),
+              HasSubstr("a.xml:3: <include>: 'parts/ball.xml' is in none of '" + here.string() +
+                        "', '" + (here / "none").string() + "', '" + library.string()));
+  write(library / "parts" / "ball.xml", "b");
+  EXPECT_EQ(body(scene), "b");
+  EXPECT_THAT(fault(metric_scene("<include file=\"parts/bal.xml\"/>")),
+              HasSubstr("did you mean 'parts/ball.xml'"));
+  std::filesystem::create_directories(here / "parts");
+  write(here / "parts" / "ball.xml", "c");
+  EXPECT_EQ(body(scene), "c");
+}
+
 TEST(SceneInclude, OneOfTheFilesMayHaveASectionThatIsGivenOnce) {
   const std::string ground = "<ground pos=\"0 0 -1\"/>";
   EXPECT_THAT(SceneFiles()
