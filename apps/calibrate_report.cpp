@@ -47,6 +47,7 @@ std::string error_text(const char* what, const PressError& error) {
 
 /// "taken as 0: force_zero [N]: 0.2 N, 1 % of the peak, would move kn by 2 %".
 std::string given_text(const GivenNumber& given, const CalibrationReport& report) {
+  if (given.told && given.moved.empty()) return "";
   const bool force = given.name == kForceZero;
   std::string text = fmt::format("taken as 0: {}", label_of(given.name, report));
   if (!given.moved.empty())

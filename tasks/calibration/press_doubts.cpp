@@ -20,7 +20,7 @@ constexpr double kFastestPress = 2;                         // [m/s]
 constexpr double kLeastModulus = 5e3, kMostModulus = 2e7;   // of skins [Pa]
 constexpr double kSoftest = 5e5, kStiffest = 5e10;          // by area, without a thickness [N/m³]
 constexpr double kFilm = 2.3;                               // kn t/E of a film (docs/skin.md)
-constexpr double kCellError = 0.09, kMostCellError = 0.03;  // h/√(R d) has this error of a force
+constexpr double kCellError = 0.09, kMostCellError = 0.04;  // h/√(R d) has this error of a force
 constexpr int kFewestPoints = 9;
 constexpr double kUsualLayerCell = 0.2;  // of a layer, by the thickness
 
