@@ -37,7 +37,7 @@ struct CalibrateArguments {
   std::optional<double> hold_out, pixel;
   std::vector<double> nodes;
   double zero = 0;
-  bool score = false, overwrite = false;
+  bool score = false, friction = false, overwrite = false;
 };
 
 void check_indenter(const CalibrateArguments& a) {
@@ -87,6 +87,7 @@ int run_channels(const CalibrateArguments& a, const Console& console) {
           {"--pixel", a.pixel.has_value()},
           {"--table", a.table.has_value()},
           {"--score", a.score},
+          {"--friction", a.friction},
           {"--fit", !a.numbers.empty()}},
          "a fit of the skin's numbers of its own, before");
   check_indenter(a);
@@ -214,8 +215,8 @@ Written written_layout(Fitted fitted, const CalibrateArguments& a, const Calibra
   for (const char* const name : {kZero, kForceZero, kLag})
     if (numbers.contains(name)) kept[name] = numbers[name];
   const auto scene = [&](const SkinNumbers&) { return press_scene(fitted.layout, a.indenter); };
-  const PressError error =
-      check_calibration({.scene = scene, .start = {}}, kept, recording, found.rows);
+  const PressError error = check_calibration({.scene = scene, .start = {}, .friction = a.friction},
+                                             kept, recording, found.rows);
   return {std::move(fitted.layout), error};
 }
 
@@ -263,6 +264,7 @@ void check_for_pictures(const CalibrateArguments& a) {
                                     {"--box", !a.indenter.box.empty()},
                                     {"--table", a.table.has_value()},
                                     {"--score", a.score},
+                                    {"--friction", a.friction},
                                     {"--fit", !a.numbers.empty()},
                                     {"--hold-out", a.hold_out.has_value()},
                                     {"--check", !a.check.empty()}})
@@ -318,6 +320,7 @@ int run_calibrate(const CalibrateArguments& a, const Console& console) {
                                    .knots = fitted.knots,
                                    .numbers = a.numbers,
                                    .fit = !a.score && !fitted.has_table,
+                                   .friction = a.friction,
                                    .hold_out = a.hold_out.value_or(0)};
   std::vector<std::string> doubts =
       doubts_of_press(press_scene(fitted.layout, a.indenter), recording);
@@ -390,6 +393,8 @@ Command add_calibrate(CLI::App& program) {
       "none; of --channels 0.2]");
   add_text(app, "--check", a.check, "OTHER.csv",
            "Another recording, whose normal forces or channels are compared with those of the fit");
+  add_flag(app, "--friction", a.friction,
+           "Compute the normal force with the layout's friction: mu, ks and kt");
   add_flag(app, "--score", a.score,
            "Fit nothing: compare the layout as it is. So is one with a table, without --table");
   add_overwrite_option(app, a.overwrite);

@@ -85,6 +85,9 @@ std::string turns_text(const Calibration& found) {
 std::string friction_text(const CalibrationReport& report) {
   const FrictionShare& friction = report.found.friction;
   if (friction.mu == 0) return "";
+  if (friction.moved.empty())
+    return fmt::format("with friction: mu = {:.3g} adds {} of the peak at most\n", friction.mu,
+                       percent(friction.largest));
   std::string text =
       fmt::format("without friction: mu = {:.3g} adds {} of the peak at most; with it", friction.mu,
                   percent(friction.largest));

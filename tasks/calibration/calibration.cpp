@@ -18,6 +18,7 @@ namespace {
 
 constexpr double kStuck = 1e3, kSlipStart = 0.9;  // of the largest ratio of shear to normal force
 constexpr double kStiffStart = 3;                 // of the spring that fits without slip
+constexpr int kFrictionPasses = 5;                // each is a twentieth to a tenth as far off
 constexpr double kUnlike = 0.3;                   // correlation of forces that have one sign
 constexpr double kSliderStart = 0.1;              // of the peak
 constexpr double kSmallest = 0.05;  // of the peak: smaller forces have no error of their own
@@ -255,22 +256,45 @@ void check_shear_sign(const Forces& shear, const SkinNumbers& numbers,
                     alike));
 }
 
-/// Finds what the friction of the sensor would do.
+/// Returns what friction adds at all rows; empty if the sensor has none, or if rows are sheared.
+std::vector<double> friction_forces(const CalibrationRequest& request, const PressRecording& r,
+                                    const SkinNumbers& numbers) {
+  const Scene scene = request.scene(numbers);
+  const ContactCoefficients& c = scene.sensors.at(0).coefficients;
+  if (!(c.mu > 0) || !(c.ks > 0) || varies(r.shear)) {
+    if (!request.friction) return {};
+    throw InputError(
+        fmt::format("a fit with friction, of {} with mu = {} and ks = {}; expected a press without "
+                    "shear, and mu and ks above 0",
+                    varies(r.shear) ? "a shear" : "a sensor", c.mu, c.ks));
+  }
+  try {
+    return friction_shares(scene, acting_depths(r, numbers), r.time);
+  } catch (const InputError&) {  // a step of the path failed: nothing is known
+    if (request.friction) throw;
+    return {};
+  }
+}
+
+/// Computes the forces with all that the request has.
+std::vector<double> all_forces(const CalibrationRequest& request, const PressRecording& r,
+                               const SkinNumbers& numbers) {
+  std::vector<double> out = normal_forces(request, r, numbers);
+  if (!request.friction) return out;
+  const std::vector<double> more = friction_forces(request, r, numbers);
+  for (std::size_t k = 0; k < out.size(); ++k) out[k] += more[k];
+  return out;
+}
+
+/// Finds what friction does, or would do where the fit is without it.
 FrictionShare friction_share(const CalibrationRequest& request, const PressRecording& r,
                              const ForceFit& along, const SkinNumbers& found) {
-  const Scene scene = request.scene(found);
-  const ContactCoefficients& c = scene.sensors.at(0).coefficients;
+  const std::vector<double> share = friction_forces(request, r, found);
   FrictionShare out;
-  if (!(c.mu > 0) || !(c.ks > 0) || varies(r.shear)) return out;
-  std::vector<double> share;
-  try {
-    share = friction_shares(scene, acting_depths(r, found), r.time);
-  } catch (const InputError&) {  // a step of the path failed: nothing is known
-    return out;
-  }
-  out.mu = c.mu;
+  if (share.empty()) return out;
+  out.mu = request.scene(found).sensors.at(0).coefficients.mu;
   out.largest = peak_of(share) / peak_of(r.force);
-  out.moved = along.moves(share);
+  if (!request.friction) out.moved = along.moves(share);
   return out;
 }
 
@@ -334,25 +358,36 @@ Calibration calibrate(const CalibrationRequest& request, const PressRecording& r
 
   SkinNumbers start = request.start;
   if (!names.normal.empty()) scale_start(request, recording, depth, start);
-  const auto press = [&](SkinNumbers numbers) {
+  std::vector<double> sticking(recording.rows());  // of friction, held while the rest is fitted
+  const auto full = [&](SkinNumbers numbers) {
     if (request.knots > 0) numbers[kDepth] = table_depth(depth, numbers);
-    return normal_forces(request, recording, numbers);
+    return numbers;
+  };
+  const auto press = [&](const SkinNumbers& numbers) {
+    std::vector<double> force = normal_forces(request, recording, full(numbers));
+    for (std::size_t k = 0; k < force.size(); ++k) force[k] += sticking[k];
+    return force;
   };
   ForceFit along(press, recording.force, rows, depth, request.knots);
   along.run(names.normal, start, out.found, names.held);
+  for (int pass = 0; request.friction && !names.normal.empty() && pass < kFrictionPasses; ++pass) {
+    sticking = friction_forces(request, recording, full(along.found()));
+    along = ForceFit(press, recording.force, rows, depth, request.knots);
+    along.run(names.normal, start, out.found, names.held);
+  }
   add_given(along, names, !request.numbers.empty(), out);
   add_fit(along, out);
   out.zero_correlation = along.correlation(kZero, kForceZero);
   if (request.knots > 0) out.found[kDepth] = table_depth(depth, out.found);
   out.rows_above = rows_above(acting_depths(recording, out.found), rows);
-  const std::vector<double> normal = normal_forces(request, recording, out.found);
+  const std::vector<double> normal = all_forces(request, recording, out.found);
   out.normal = error_of(normal, recording.force, rows);
   out.normal_held_out = error_of(normal, recording.force, out.held_out);
   if (!names.normal.empty()) out.friction = friction_share(request, recording, along, out.found);
   if (names.shear.empty() && (request.fit || recording.shear.empty())) return out;
 
-  const auto path = [&](SkinNumbers numbers) {
-    if (request.knots > 0) numbers[kDepth] = table_depth(depth, numbers);
+  const auto path = [&](const SkinNumbers& chosen) {
+    const SkinNumbers numbers = full(chosen);
     return shear_forces(request.scene(numbers), acting_depths(recording, numbers), recording.shear);
   };
   if (std::ranges::count(names.shear, kFriction) > 0)
@@ -381,7 +416,7 @@ PressError check_calibration(const CalibrationRequest& request, const SkinNumber
           "the other recording has no times, and '{}' was fitted; expected times", name));
   if (rows.empty())
     for (int k = 0; k < int(recording.rows()); ++k) rows.push_back(k);
-  return error_of(normal_forces(request, recording, found), recording.force, rows);
+  return error_of(all_forces(request, recording, found), recording.force, rows);
 }
 
 }  // namespace tangere

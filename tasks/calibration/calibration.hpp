@@ -31,6 +31,9 @@ struct CalibrationRequest {
   std::vector<std::string> numbers{};
   /// Whether anything is fitted if `numbers` is empty.
   bool fit = true;
+  /// Whether the normal force is fitted with the friction that the sensor has. Without times, or
+  /// with a shear, it is that of a slow press.
+  bool friction = false;
   /// Rows that are compared and not fitted, of all; as held_out_rows().
   double hold_out = 0;
 };
@@ -57,7 +60,7 @@ struct Calibration {
   std::optional<double> zero_correlation;
   int rows_above = 0;      ///< of the fitted rows, those above the skin
   std::vector<int> turns;  ///< rows that are not fitted, because the rate of the depth jumps there
-  /// What the friction of the sensor would do, which the normal force is computed without.
+  /// What the friction of the sensor adds; what it would move where the fit is without it.
   FrictionShare friction;
   SkinNumbers found;          ///< all numbers that were fitted, and "table_depth"
   std::vector<int> rows;      ///< that are fitted

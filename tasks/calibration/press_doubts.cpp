@@ -13,7 +13,7 @@
 namespace tangere {
 namespace {
 
-constexpr double kLargestBall = 0.1, kSmallestBall = 1e-4;  // radius [m]
+constexpr double kLargestBall = 0.1, kLargestFlat = 0.3, kSmallestEnd = 1e-4;  // [m]
 constexpr double kLargestByPad = 3;                         // radius, by the pad's longer side
 constexpr double kDeepestPress = 0.05, kShallowest = 5e-6;  // [m], without a thickness
 constexpr double kFastestPress = 2;                         // [m/s]
@@ -76,17 +76,25 @@ double cut_radius(double ball, double depth) {
   return depth < ball ? std::sqrt(depth * (2 * ball - depth)) : ball;
 }
 
-void doubt_ball(double ball, const Places& places, std::vector<std::string>& out) {
-  if (ball > kLargestBall || (places.side > 0 && ball > kLargestByPad * places.side))
-    out.push_back(fmt::format(
-        "a ball of radius {:.4g} m on a pad of {:.3g} m; expected metres, {:.3g} "
-        "at most{}",
-        ball, places.side,
-        places.side > 0 ? std::min(kLargestBall, kLargestByPad * places.side) : kLargestBall,
-        factor_text(ball, 1e-3, "it is in mm")));
-  if (ball < kSmallestBall)
-    out.push_back(fmt::format("a ball of radius {:.4g} m; expected metres, {:.3g} at least{}", ball,
-                              kSmallestBall, factor_text(ball, 1e3, "it was divided by 1000")));
+/// A flat end may be larger than the pad: it is only held against a length that none has.
+void doubt_size(const Scene& scene, const Places& places, std::vector<std::string>& out) {
+  const Shape& shape = scene.links.at(1).body.shape;
+  const std::optional<double> ball = ball_of(scene);
+  double size = ball.value_or(0);
+  if (const auto* const flat = std::get_if<CylinderShape>(&shape)) size = flat->radius;
+  if (const auto* const box = std::get_if<CuboidShape>(&shape))
+    size = std::max(box->size[0], box->size[1]);
+  const double most = !ball             ? kLargestFlat
+                      : places.side > 0 ? std::min(kLargestBall, kLargestByPad * places.side)
+                                        : kLargestBall;
+  const char* const what = ball ? "a ball of radius" : "a flat end of size";
+  if (size > most)
+    out.push_back(fmt::format("{} {:.4g} m on a pad of {:.3g} m; expected metres, {:.3g} at most{}",
+                              what, size, places.side, most,
+                              factor_text(size, 1e-3, "it is in mm")));
+  if (size < kSmallestEnd)
+    out.push_back(fmt::format("{} {:.4g} m; expected metres, {:.3g} at least{}", what, size,
+                              kSmallestEnd, factor_text(size, 1e3, "it was divided by 1000")));
 }
 
 void doubt_depth(double depth, std::optional<double> thickness, std::vector<std::string>& out) {
@@ -147,7 +155,7 @@ std::vector<std::string> doubts_of_press(const Scene& scene, const PressRecordin
   const Places places = places_of(scene);
   const std::optional<double> ball = ball_of(scene);
   const double depth = r.rows() > 0 ? *std::ranges::max_element(r.depth) : 0;
-  if (ball) doubt_ball(*ball, places, out);
+  doubt_size(scene, places, out);
   doubt_depth(depth, thickness_of(scene.sensors[0]), out);
   doubt_speed(r, out);
   if (ball && out.empty()) doubt_resolution(scene.sensors[0], *ball, depth, places, out);

@@ -179,6 +179,10 @@ TEST(CalibrateRecording, ImplausibleUnitsAreNamed) {
   EXPECT_THAT(run(folder, {"calibrate", "press.csv", "--sensor", "skin.xml", "--ball", "4"}).err,
               HasSubstr("a ball of radius 4 m on a pad of 0.01 m; expected metres, 0.03 at most; "
                         "0.004 if it is in mm"));
+  EXPECT_THAT(
+      run(folder, {"calibrate", "press.csv", "--sensor", "skin.xml", "--flat", "3.5"}).err,
+      HasSubstr("a flat end of size 3.5 m on a pad of 0.01 m; expected metres, 0.3 at most; "
+                "0.0035 if it is in mm"));
   folder.write("press.csv", "time,depth,force\n0,0,0\n1e-5,1e-4,1\n2e-5,2e-4,3\n");
   EXPECT_THAT(run(folder, ball).err, HasSubstr("a speed of 10 m/s; expected times in s"));
 }
@@ -266,6 +270,30 @@ TEST(CalibrateRecording, ATableThatEndsLevelIsNamed) {
   folder.write("press.csv", "depth_mm,force\n0.1,0.37\n0.2,0.74\n");
   const Outcome rising = run(folder, kFlat + Words{"--table", "2", "--fit", "pressure"});
   EXPECT_THAT(rising.err, Not(HasSubstr("level")));
+}
+
+/// What friction would move is what a fit with it moves (tests/tasks/calibration has the truth).
+TEST(CalibrateRecording, FrictionOfTheLayoutIsFittedIfNamed) {
+  const Folder folder;
+  folder.write("skin.xml", layout("modulus=\"2e5\" thickness=\"4e-3\" mu=\"0.3\""));
+  folder.write("press.csv", table("depth_mm,force", 12, [](int k) {
+                 const double d = 5e-5 * (k + 1);
+                 return std::vector<double>{1e3 * d, 3.14 * 1.15e8 * (6e-3 - d) * d * d};
+               }));
+  const Words ball = {"calibrate", "press.csv", "--sensor", "skin.xml", "--ball", "0.006"};
+  const json without = run_json(folder, ball), with = run_json(folder, ball + Words{"--friction"});
+  EXPECT_EQ(without["friction"]["mu"], 0.3);
+  EXPECT_EQ(with["friction"]["moved"], json::array());
+  const double a = number(without, "modulus")["value"], b = number(with, "modulus")["value"],
+               moved = without["friction"]["moved"][0]["value"];
+  EXPECT_LT(moved, -0.01 * a);
+  EXPECT_NEAR(b - a, moved, 0.1 * std::abs(moved));
+  EXPECT_THAT(run(folder, ball).out, HasSubstr("without friction: mu = 0.3 adds "));
+  EXPECT_THAT(run(folder, ball + Words{"--friction"}).out,
+              HasSubstr("with friction: mu = 0.3 adds "));
+  folder.write("skin.xml", layout("kn=\"50\" mu=\"0.3\""));
+  EXPECT_THAT(run(folder, ball + Words{"--friction"}).err,
+              HasSubstr("a fit with friction, of a sensor with mu = 0.3 and ks = 0; expected"));
 }
 
 /// At the turn of a fast press the rate is not known: the row is not fitted, and the rest is exact.

@@ -16,6 +16,7 @@ namespace tangere {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 /// A ball of radius 7.5 mm on a vertical slide above a plate with a sensor at height 0.
 Scene pressed(const std::string& sensor, const std::string& defaults = "",
@@ -140,6 +141,23 @@ TEST(SkinMaterial, PartsThatDoNotFitAreErrors) {
               HasSubstr("modulus and pressure; expected one of them"));
   EXPECT_THAT(fault(table + R"(per="point")"), HasSubstr("pressure and per=\"point\""));
   EXPECT_THAT(fault(table + R"(feedback="true")"), HasSubstr("feedback and pressure"));
+}
+
+TEST(SkinMaterial, ATableThatEndsLevelIsAWarning) {
+  const auto warnings = [](const std::string& pressures) {
+    const std::string text = std::string(R"(<tangere><option unit="m-kg"/><robot><link name="a">
+      <joint name="a" type="fixed"/><body name="plate" type="cuboid" size="0.1 0.1 0.01"/></link>
+      </robot><sensor>)") + kPad +
+                             R"(pressure_depth="0 1e-3 2e-3" pressure=")" + pressures +
+                             R"("/></sensor></tangere>)";
+    std::string all;
+    for (const std::string& warning : parse_scene(text, "s.xml").warnings) all += warning;
+    return all;
+  };
+  EXPECT_THAT(warnings("0 1e4 1e4"),
+              HasSubstr("<tactile>: pressure ends level: 10000 Pa from 0.001 m on, so a body that "
+                        "goes deeper presses no harder"));
+  EXPECT_THAT(warnings("0 1e4 1.1e4"), Not(HasSubstr("level")));
 }
 
 /// c of the formula at the sizes of its head comment, and the share of a size-independent one.

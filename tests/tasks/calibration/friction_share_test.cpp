@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 
+#include "engine/base/error.hpp"
 #include "engine/sense/readout.hpp"
 #include "engine/step/stepper.hpp"
 #include "io/scene/scene_reader.hpp"
@@ -53,7 +54,7 @@ PressRecording stepped_press() {
   return out;
 }
 
-TEST(FrictionShare, SaysHowFarFrictionMovesTheNumbers) {
+CalibrationRequest press_request() {
   CalibrationRequest request;
   request.scene = [](const SkinNumbers& numbers) {
     const auto number = [&](const char* name, double otherwise) {
@@ -64,18 +65,39 @@ TEST(FrictionShare, SaysHowFarFrictionMovesTheNumbers) {
             .scene);
   };
   request.start = {{"modulus", 1e5}, {"relaxation", 5e-3}};
-  const Calibration found = calibrate(request, stepped_press());
+  return request;
+}
+
+const std::array kTruth{kTrueModulus, 0.0, kTrueTau};
+
+TEST(FrictionShare, SaysHowFarFrictionMovesTheNumbers) {
+  const Calibration found = calibrate(press_request(), stepped_press());
   EXPECT_EQ(found.friction.mu, 0.6);
   EXPECT_GT(found.friction.largest, 0.02);
   ASSERT_EQ(found.friction.moved.size(), 3U);
-  const std::array truth{kTrueModulus, 0.0, kTrueTau};
-  for (std::size_t k = 0; k < truth.size(); ++k) {
+  for (std::size_t k = 0; k < kTruth.size(); ++k) {
     const FittedNumber& number = found.numbers[k];
-    const double off = number.value - truth[k], said = -found.friction.moved[k].value;
-    EXPECT_TRUE(truth[k] < number.low || truth[k] > number.high)
+    const double off = number.value - kTruth[k], said = -found.friction.moved[k].value;
+    EXPECT_TRUE(kTruth[k] < number.low || kTruth[k] > number.high)
         << number.name << " is beyond its interval without friction";
     EXPECT_NEAR(off, said, 0.25 * std::abs(off)) << number.name << " " << number.value;
   }
+}
+
+TEST(FrictionShare, AFitWithFrictionFindsTheNumbers) {
+  CalibrationRequest request = press_request();
+  request.friction = true;
+  const Calibration found = calibrate(request, stepped_press());
+  EXPECT_NEAR(found.numbers[0].value, kTrueModulus, 2e-3 * kTrueModulus);
+  EXPECT_NEAR(found.numbers[1].value, 0, 5e-8);
+  EXPECT_NEAR(found.numbers[2].value, kTrueTau, 2e-3 * kTrueTau);
+  EXPECT_LT(found.normal.largest, 2e-3);
+  EXPECT_TRUE(found.friction.moved.empty());
+  PressRecording sheared = stepped_press();
+  sheared.shear.assign(sheared.rows(), 0);
+  sheared.shear_force.assign(sheared.rows(), 0);
+  sheared.shear.back() = 1e-4, sheared.shear_force.back() = 1;
+  EXPECT_THROW(calibrate(request, sheared), InputError);
 }
 
 }  // namespace
