@@ -121,9 +121,10 @@ std::optional<PressureTable> read_pressures(const SceneElement& node, const std:
     node.fail(fmt::format("{} numbers of pressure_depth and {} of pressure; expected as many",
                           table.depth.size(), table.pressure.size()));
   if (const auto last = table.pressure.end() - 1; last[0] == last[-1] && last[0] > 0)
-    node.warn(fmt::format("pressure ends level: {} Pa from {} m on, so a body that goes deeper "
-                          "presses no harder; expected a last pressure above the one before",
-                          last[0], table.depth.end()[-2]));
+    node.warn(
+        fmt::format("pressure ends level: {} Pa from {} m on, so a body that goes deeper "
+                    "presses no harder; expected a last pressure above the one before",
+                    last[0], table.depth.end()[-2]));
   return table;
 }
 

@@ -34,7 +34,7 @@ endif()
 run(${prefix}/bin/tangere --help)
 # A scene elsewhere includes a layout that was installed.
 file(WRITE ${WORK}/elsewhere.xml "<tangere><option unit=\"m-kg\"/><robot><link name=\"a\"><joint name=\"a\" "
-  "type=\"fixed\"/><body name=\"a\" type=\"sphere\" radius=\"0.01\"/></link></robot>"
+  "type=\"free2d\"/><body name=\"a\" type=\"sphere\" radius=\"0.01\"/></link></robot>"
   "<sensor><include file=\"sensors/digit_guess.xml\" body=\"a\"/></sensor></tangere>")
 run(${prefix}/bin/tangere inspect ${WORK}/elsewhere.xml)
 
