@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tangere validate: reports everything that is wrong with a data set.
+// tangere validate: reports everything that is wrong with a data set or an export.
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
@@ -7,12 +7,40 @@
 #include "apps/arguments.hpp"
 #include "apps/command.hpp"
 #include "apps/scene_run.hpp"
+#include "engine/base/error.hpp"
 #include "io/dataset/dataset_files.hpp"
+#include "io/export/exported_set.hpp"
 
 namespace tangere::apps {
 namespace {
 
+/// An export: the sums of its files.
+int validate_export(const std::string& path, const ExportedSet& set, const Console& console) {
+  if (set.stored.empty() && set.format != "csv")
+    throw IoError(
+        fmt::format("'{}' has no checksums of its files: an older version wrote it; "
+                    "export the data set again",
+                    path));
+  const std::vector<std::string> problems = damaged_files(path, set.stored);
+  const ExitCode code = problems.empty() ? kDone : kInputOutput;
+  for (const std::string& problem : problems) console.fail("tangere: " + problem);
+  console.print(
+      fmt::format("{}, episodes: {}, frames: {}, files: {}, {} bytes: {}", set.title, set.episodes,
+                  set.frames, set.files, set.bytes,
+                  problems.empty() ? "whole" : fmt::format("{} problems", problems.size())));
+  Json result{{"command", "validate"}, {"exit_code", static_cast<int>(code)},
+              {"input", path},         {"format", set.format},
+              {"problems", problems},  {"episodes", set.episodes},
+              {"frames", set.frames},  {"files", set.files},
+              {"bytes", set.bytes}};
+  if (code != kDone) result["error"] = problems.front();
+  console.result(result);
+  return code;
+}
+
 int validate(const std::string& path, const Console& console) {
+  if (const std::optional<ExportedSet> set = find_export(path))
+    return validate_export(path, *set, console);
   const DatasetReport report = examine_dataset(find_dataset(path));
   const ExitCode code = report.problems.empty() ? kDone : kInputOutput;
   for (const std::string& problem : report.problems) console.fail("tangere: " + problem);
@@ -43,7 +71,9 @@ Command add_validate(CLI::App& program) {
   CLI::App& app =
       add_command(program, "validate", "Read a data set whole and name all that is wrong with it",
                   "tangere validate balls");
-  add_text(app, "DIR", *input, "", "Folder of shards, or one file of a data set").required();
+  add_text(app, "DIR", *input, "",
+           "Folder of shards, one file of a data set, or what 'tangere export' made of it")
+      .required();
   add_console_options(app, *console);
   return {&app, [=](const ProgramInfo&) { return validate(*input, *console); },
           [] { return true; }};

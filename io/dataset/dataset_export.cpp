@@ -10,6 +10,7 @@
 
 #include "engine/base/error.hpp"
 #include "io/dataset/dataset_description.hpp"
+#include "io/dataset/shard_check.hpp"
 #include "io/files/part_file.hpp"
 #include "io/hdf5/h5_listing.hpp"
 
@@ -56,14 +57,18 @@ class CsvExport {
       : options_(options), part_(path, options.overwrite) {}
 
   ExportResult run(const DatasetFiles& dataset) {
-    part_.write("# " + value_of(dataset.settings, "name") + ", seed " +
-                value_of(dataset.settings, "seed") + "\n");
+    const auto [episodes, rows] = count(dataset);
+    part_.write(fmt::format("# {}, seed {}, {} episodes, {} rows\n",
+                            value_of(dataset.settings, "name"), value_of(dataset.settings, "seed"),
+                            episodes, rows));
     for (const std::string& path : dataset.files) {
       const h5::Id file = h5::open_file(path), data = h5::open_group(file, "data");
-      for (const std::int64_t demo : demo_numbers(data))
-        if (demo == options_.episode.value_or(demo))
-          add(h5::open_group(data, fmt::format("demo_{}", demo)), h5::open_group(file, "scene"),
-              demo);
+      const std::vector<std::int64_t> demos = chosen(data);
+      if (demos.empty() && options_.episode) continue;
+      check_shard(path);
+      for (const std::int64_t demo : demos)
+        add(h5::open_group(data, fmt::format("demo_{}", demo)), h5::open_group(file, "scene"),
+            demo);
     }
     if (options_.episode && result_.rows == 0)
       throw IoError(fmt::format(
@@ -74,6 +79,27 @@ class CsvExport {
   }
 
  private:
+  /// Episodes and rows of the table, so that one that is cut short can be told.
+  [[nodiscard]] std::pair<std::int64_t, std::int64_t> count(const DatasetFiles& dataset) const {
+    std::pair<std::int64_t, std::int64_t> counts;
+    for (const std::string& path : dataset.files) {
+      const h5::Id file = h5::open_file(path), data = h5::open_group(file, "data");
+      for (const std::int64_t demo : chosen(data)) {
+        ++counts.first;
+        counts.second += h5::read_number<std::int64_t>(
+            h5::open_group(data, fmt::format("demo_{}", demo)), "num_samples");
+      }
+    }
+    return counts;
+  }
+
+  [[nodiscard]] std::vector<std::int64_t> chosen(const h5::Id& data) const {
+    std::vector<std::int64_t> demos = demo_numbers(data);
+    if (options_.episode)
+      std::erase_if(demos, [&](std::int64_t demo) { return demo != *options_.episode; });
+    return demos;
+  }
+
   void write_header(const h5::Id& demo, const h5::Id& scene) {
     std::string line = "episode,row";
     const auto add_names = [&](const std::string& prefix, const std::vector<std::string>& names) {

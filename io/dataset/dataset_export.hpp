@@ -22,7 +22,7 @@ struct ExportResult {
 };
 
 /// Writes one line per row: episode, row, actions, reward, done, then every observation of at most
-/// 64 numbers. Throws IoError.
+/// 64 numbers. Reads each file whole, and compares it with its checksums. Throws IoError.
 ExportResult export_csv(const DatasetFiles& dataset, const std::string& path,
                         const ExportOptions& options);
 

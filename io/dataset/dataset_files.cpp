@@ -187,7 +187,8 @@ void check_complete(const DatasetFiles& dataset) {
             ? ""
             : fmt::format(", and {} more shards are", dataset.missing.size() - 1)));
   for (const std::string& file : dataset.files) {
-    const std::vector<std::string> lines = differences_of(file, dataset.settings);
+    const std::vector<std::string> lines =
+        differences(read_settings(h5::open_file(file)), dataset.settings);
     if (!lines.empty())
       throw IoError(fmt::format("'{}' does not belong to the same run as '{}': {}", file,
                                 dataset.files.front(), fmt::join(lines, "; ")));

@@ -8,6 +8,7 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <span>
 #include <vector>
 
 #include "engine/base/error.hpp"
@@ -41,6 +42,7 @@ class ShardChecker {
   }
 
   ShardReport check() {
+    const h5::Quiet quiet;  // once, not for each of a million calls
     summed_ = true;
     if (!is_of_this_format() || !is_described()) return {content_, problems_};
     const h5::Id data = h5::open_group(file_, "data"), failed = h5::open_group(file_, "failed");
@@ -191,12 +193,12 @@ class ShardChecker {
     // These values need no checksum: without a task every reward is 0, and only the last row ends
     // the episode.
     if (is_task_) {
-      add<float>(demo, "rewards", episode, names_.size() + 1, 0, rows);
+      add<float>(h5::open_dataset(demo, "rewards"), "rewards", episode, names_.size() + 1, 0, rows);
     } else {
       check_list<float>(demo, "rewards", episode, rows, 0);
     }
     check_list<std::int8_t>(demo, "dones", episode, rows, 1);
-    add<float>(demo, "actions", episode, 0, 0, rows);
+    add<float>(h5::open_dataset(demo, "actions"), "actions", episode, 0, 0, rows);
     const h5::Id obs = h5::open_group(demo, "obs"), final_obs = h5::open_group(demo, "final_obs");
     touching_.assign(touch_.empty() ? 0 : static_cast<std::size_t>(rows), 0);
     for (std::size_t k = 0; k < names_.size(); ++k) {
@@ -216,8 +218,9 @@ class ShardChecker {
                  names_.size() + 2 + gradients_.size() + k);
     if (h5::has_link(demo, "next_obs"))
       for (const std::string& name : names_)
-        if (!h5::has_files(h5::open_dataset(obs, name)))  // no view shows those
-          in_type_of(obs, name,
+        if (const h5::Id dataset = h5::open_dataset(obs, name);
+            !h5::has_files(dataset))  // no view shows those
+          in_type_of(dataset,
                      [&](auto zero) { check_next<decltype(zero)>(demo, name, episode, rows); });
     content_.rows += rows;
     ++content_.demos;
@@ -247,10 +250,10 @@ class ShardChecker {
   void add_observation(const h5::Id& group, const std::string& name, std::int64_t episode,
                        std::size_t index, std::int64_t first, std::int64_t rows,
                        bool touch = false) {
-    if (const h5::Id dataset = h5::open_dataset(group, name); h5::has_files(dataset))
-      return add_files(dataset, name, episode, index, first, rows);
-    in_type_of(group, name, [&](auto zero) {
-      add<decltype(zero)>(group, name, episode, index, first, rows, touch);
+    const h5::Id dataset = h5::open_dataset(group, name);
+    if (h5::has_files(dataset)) return add_files(dataset, name, episode, index, first, rows);
+    in_type_of(dataset, [&](auto zero) {
+      add<decltype(zero)>(dataset, name, episode, index, first, rows, touch);
     });
   }
 
@@ -285,8 +288,8 @@ class ShardChecker {
   /// Calls body(T{}) with a number of an observation: a byte of a picture, the number of a body,
   /// or the type of the others.
   template <class Body>
-  void in_type_of(const h5::Id& group, const std::string& name, const Body& body) {
-    const h5::Id dataset = h5::open_dataset(group, name), type(H5Dget_type(dataset.get()));
+  void in_type_of(const h5::Id& dataset, const Body& body) {
+    const h5::Id type(H5Dget_type(dataset.get()));
     if (H5Tget_size(type.get()) == 1)
       body(std::uint8_t{});
     else if (H5Tget_size(type.get()) == 2)
@@ -304,7 +307,7 @@ class ShardChecker {
     const h5::Dims dims = h5::dimensions(dataset);
     if (dims.empty())
       return fail(fmt::format("demo_{}: {} is one number; expected a list", episode, stored.name));
-    add<double>(demo, stored.name, episode, index, 0,
+    add<double>(dataset, stored.name, episode, index, 0,
                 stored.per_row ? rows : static_cast<std::int64_t>(dims[0]));
   }
 
@@ -372,7 +375,7 @@ class ShardChecker {
   }
 
   template <class T>
-  void check_finite(const std::vector<T>& numbers, const std::string& name, std::int64_t first,
+  void check_finite(std::span<const T> numbers, const std::string& name, std::int64_t first,
                     std::size_t width) {
     if (!std::is_floating_point_v<T> || !finite_ || not_finite_.size() >= kMostProblems) return;
     const auto bad =
@@ -386,9 +389,8 @@ class ShardChecker {
   /// Adds a dataset whose row 0 is row `first` of the episode. If it is `touch`, marks the rows
   /// that are not all zero.
   template <class T>
-  void add(const h5::Id& group, const std::string& name, std::int64_t episode, std::size_t index,
+  void add(const h5::Id& dataset, const std::string& name, std::int64_t episode, std::size_t index,
            std::int64_t first, std::int64_t rows, bool touch = false) {
-    const h5::Id dataset = h5::open_dataset(group, name);
     const std::string full = fmt::format("demo_{}: {}", episode, name);
     if (!has_rows(dataset, full, rows)) return;
     h5::Dims count = h5::dimensions(dataset), offset(count.size(), 0);
@@ -401,11 +403,13 @@ class ShardChecker {
     for (std::int64_t row = 0; row < rows; row += step) {
       count[0] = static_cast<hsize_t>(std::min(step, rows - row));
       offset[0] = static_cast<hsize_t>(row);
-      buffer.resize(count[0] * width);
+      // It only grows: a vector writes zeros where it grows, and the next dataset has another size.
+      buffer.resize(std::max<std::size_t>(buffer.size(), count[0] * width));
+      const std::span<const T> numbers(buffer.data(), count[0] * width);
       h5::read_box(dataset, offset, count, buffer.data());
-      check_finite(buffer, full, first + row, width);
+      check_finite(numbers, full, first + row, width);
       for (std::size_t i = 0; touch && i < count[0]; ++i)
-        if (any_number(std::span<const T>(buffer).subspan(i * width, width)))
+        if (any_number(numbers.subspan(i * width, width)))
           touching_[static_cast<std::size_t>(row) + i] = 1;
       if (summed_)
         sum_.add(episode, index, first + row, static_cast<std::int64_t>(count[0]),

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -40,6 +41,7 @@ JsonFile notes_of(const fs::path& folder, const char* name, const char* format) 
 }
 
 void add_source(const JsonFile& notes, ExportedSet& set) {
+  set.stored = stored_files(notes);
   if (notes.has({"command"})) set.command = notes.text({"command"});
   if (notes.has({"tangere_version"})) set.tangere_version = notes.text({"tangere_version"});
 }
@@ -61,6 +63,18 @@ void check_demos(const JsonFile& notes, const ExportedSet& set) {
                                       set.episodes));
 }
 
+/// The frames that an export counts in two places, or as the sum of the steps of its episodes.
+void check_frames(const JsonFile& notes, const ExportedSet& set, const fs::path& other) {
+  if (!notes.has({"frames"})) return;
+  const std::int64_t frames = notes.count({"frames"});
+  if (frames != set.frames && other == notes.path())
+    damaged(other, fmt::format("its episodes have {} steps; expected {}, its 'frames'", set.frames,
+                               frames));
+  if (frames != set.frames)
+    damaged(other, fmt::format("it counts {} frames; expected {}, as '{}' does", set.frames, frames,
+                               notes.path()));
+}
+
 ExportedSet read_lerobot(const fs::path& folder) {
   const JsonFile notes = notes_of(folder, "meta/tangere.json", "LeRobot data set"),
                  info((folder / "meta/info.json").string());
@@ -72,6 +86,7 @@ ExportedSet read_lerobot(const fs::path& folder) {
   set.seconds_per_frame = notes.number({"seconds_per_action"});
   add_source(notes, set);
   check_demos(notes, set);
+  check_frames(notes, set, info.path());
   for (const std::string& name : info.keys_of({"features"})) {
     ExportedArray& array = set.arrays.emplace_back();
     array.name = name;
@@ -139,6 +154,7 @@ ExportedSet read_zarr(const fs::path& folder) {
   set.episodes = std::ssize(ends);
   set.frames = ends.empty() ? 0 : ends.back();
   check_demos(notes, set);
+  check_frames(notes, set, folder / "meta/episode_ends");
   std::vector<fs::path> places;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder / "data"))
     if (entry.is_directory()) places.push_back(entry.path());
@@ -181,6 +197,7 @@ ExportedSet read_univtac(const fs::path& folder) {
       throw IoError(fmt::format("'{}' has no hdf5/{}.hdf5; expected {} files of episodes",
                                 folder.string(), i, steps.size()));
   }
+  check_frames(notes, set, notes.path());
   if (steps.empty()) return set;
   const fs::path first = folder / "hdf5/0.hdf5";
   for (const h5::ArrayFacts& facts : h5::arrays_of(first.string(), notes.texts({"datasets"}))) {
@@ -192,6 +209,30 @@ ExportedSet read_univtac(const fs::path& folder) {
     set.arrays.push_back(std::move(array));
   }
   return set;
+}
+
+/// The number before a word of the title of a table, such as "2000" of " rows"; none: no such word.
+std::optional<std::int64_t> counted(const std::string& title, const std::string& word) {
+  const std::size_t end = title.rfind(word);
+  if (end == std::string::npos || end == 0) return {};
+  const std::size_t begin = title.find_last_not_of("0123456789", end - 1);
+  std::int64_t count = 0;
+  const char* const from = title.data() + (begin == std::string::npos ? 0 : begin + 1);
+  const auto [at, error] = std::from_chars(from, title.data() + end, count);
+  if (error != std::errc() || at != title.data() + end) return {};
+  return count;
+}
+
+/// A table whose end is missing has fewer rows than its title says, or no end of the last line.
+void check_table(const fs::path& path, const std::string& title, bool ends, ExportedSet& set) {
+  if (set.frames > 0 && !ends)
+    damaged(path, fmt::format("line {} does not end; expected rows that do", set.frames + 2));
+  const std::optional<std::int64_t> rows = counted(title, " rows"),
+                                    episodes = counted(title, " episodes");
+  if (rows && episodes && (*rows != set.frames || *episodes != set.episodes))
+    damaged(path, fmt::format("it has {} rows of {} episodes; expected {} of {}, as its first line "
+                              "says",
+                              set.frames, set.episodes, *rows, *episodes));
 }
 
 /// A table: a line that says of what, the names of columns, a line for each row.
@@ -211,7 +252,9 @@ std::optional<ExportedSet> read_table(const fs::path& path) {
   }
   const auto columns = std::ssize(set.arrays) + 2;
   std::string line, last;
+  bool ends = true;
   for (std::int64_t number = 3; std::getline(file, line); ++number) {
+    ends = !file.eof();
     if (std::count(line.begin(), line.end(), ',') + 1 != columns || line.empty())
       damaged(path, fmt::format("line {} has {} columns; expected {}", number,
                                 std::count(line.begin(), line.end(), ',') + 1, columns));
@@ -219,6 +262,7 @@ std::optional<ExportedSet> read_table(const fs::path& path) {
     if (episode != last) ++set.episodes, last = episode;
     ++set.frames;
   }
+  check_table(path, title, ends, set);
   return set;
 }
 
@@ -250,7 +294,9 @@ std::optional<ExportedSet> find_export(const std::string& path) {
   } else if (place.extension() == ".csv" && fs::is_regular_file(place, none)) {
     set = read_table(place);
   }
-  if (set) add_sizes(place, *set);
+  if (!set) return set;
+  check_sizes(place, set->stored);
+  add_sizes(place, *set);
   return set;
 }
 

@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "io/export/stored_files.hpp"
+
 namespace tangere {
 
 struct ExportedArray {
@@ -25,10 +27,12 @@ struct ExportedSet {
   std::int64_t files = 0;
   std::uintmax_t bytes = 0;  ///< of all files
   std::vector<ExportedArray> arrays;
+  std::vector<StoredFiles> stored;  ///< what it says of its files; none of a table
 };
 
 /// Describes an export; none where the path is something else. Throws IoError for an export that is
-/// damaged, unfinished (OUT.part) or that another program wrote; the message names the file.
+/// damaged, unfinished (OUT.part) or that another program wrote; the message names the file. Counts
+/// and sizes of files are compared, their numbers are not read.
 std::optional<ExportedSet> find_export(const std::string& path);
 
 }  // namespace tangere

@@ -6,6 +6,12 @@
 
 namespace tangere::h5 {
 
+namespace {
+
+thread_local int quiet_ones = 0;  // the library keeps its error output for each thread
+
+}  // namespace
+
 Quiet::Quiet() {
   note_call_begins();
   // Otherwise the library would try again, and complain, at the end of the program about a file
@@ -13,13 +19,14 @@ Quiet::Quiet() {
   // already in use.
   static const herr_t no_exit_handler = H5dont_atexit();
   static_cast<void>(no_exit_handler);
+  if (quiet_ones++ > 0) return;
   H5Eget_auto2(H5E_DEFAULT, &function_, &data_);
   H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
 }
 
 Quiet::~Quiet() {
   note_call_ends();
-  H5Eset_auto2(H5E_DEFAULT, function_, data_);
+  if (--quiet_ones == 0) H5Eset_auto2(H5E_DEFAULT, function_, data_);
 }
 
 void Id::reset() noexcept {

@@ -29,4 +29,5 @@ NB_MODULE(_core, m) {
   add_tapes(m);
   add_scene_tapes(m);
   add_views(m);
+  add_data_files(m);
 }

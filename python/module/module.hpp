@@ -17,5 +17,6 @@ void add_episode_writer(nanobind::module_& m);
 void add_tapes(nanobind::module_& m);
 void add_scene_tapes(nanobind::module_& m);
 void add_views(nanobind::module_& m);
+void add_data_files(nanobind::module_& m);
 
 }  // namespace tangere::python

@@ -18,7 +18,7 @@ Arrays are those of the files, without a change of type or unit.
 from __future__ import annotations
 
 import re
-from typing import Any, Sequence
+from typing import Any, Collection, Sequence
 
 import numpy as np
 
@@ -79,6 +79,7 @@ class Frames:
         first = episodes.arrays(self.chosen[0], ["q"])["q"][0]
         note: dict[str, Any] = {
             "name": str(said["name"]), "text": str(said["text"]),
+            **({"included": str(said["included"])} if "included" in said else {}),
             "q_names": [str(name) for name in said["q_names"]],
             "q_start": [float(x) for x in first],
             "sensors": {
@@ -92,6 +93,20 @@ class Frames:
             note["randomized_names"] = drawn
             note["randomized"] = [[of[name] for name in drawn] for of in values]
         return {"scene": note}
+
+    def split(self) -> tuple[dict[str, list[int]], dict[str, list[int]]]:
+        """What a robot measures of privileged observations, and what it does not: KEY → places of
+        numbers. No places stand for a whole observation. q and v of a scene are in both, where some
+        joints have motors."""
+        episodes = self.episodes
+        measured = {key: places for key in episodes.keys if (places := episodes.measured(key))}
+        hidden: dict[str, list[int]] = {}
+        for key in episodes.privileged:
+            width = len(episodes.attributes[f"{key}_names"]) if key in measured else 0
+            rest = [k for k in range(width) if k not in measured[key]]
+            if rest or key not in measured:
+                hidden[key] = rest
+        return measured, hidden
 
     def is_touch(self, key: str) -> bool:
         """Whether an observation is a reading of a sensor and no picture in colours."""
@@ -249,3 +264,20 @@ def unit_and_meaning(episodes: Episodes, key: str) -> tuple[str, str]:
         meanings[key] = str(sensor["reading_components"][readings.index(key)])
     unit = units.get(key) or str(episodes.sensors.get(key, {}).get("units", ""))
     return "" if unit.endswith("_units") else unit, meanings.get(key, "")
+
+
+def names_of(episodes: Episodes, key: str, places: Sequence[int]) -> list[str]:
+    """Names of some numbers of q or v."""
+    names = [str(name) for name in episodes.attributes[f"{key}_names"]]
+    return [names[k] for k in places]
+
+
+def hidden_in_words(frames: Frames, written: Collection[str] = ()) -> str:
+    """What a robot does not measure, without observations that are written: "q of rod; v of rod"."""
+    words = []
+    for key, places in frames.split()[1].items():
+        names = names_of(frames.episodes, key, places) if places else []
+        joints = dict.fromkeys(name.rpartition(".")[0] for name in names)
+        if key not in written:
+            words.append(f"{key} of {', '.join(joints)}" if places else key)
+    return ("; " if any(" of " in word for word in words) else ", ").join(words)

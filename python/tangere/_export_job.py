@@ -2,13 +2,16 @@
 """The folder of an export and its parts: what all formats share.
 
 A format cuts its frames into parts, which follow from the data set and the options alone. Each part
-is written by one process, so the bytes do not depend on how many there are. A folder is called
-OUTPUT.part until all parts are there:
+is written by one process, so the bytes do not depend on how many there are. The files of the data
+set are compared with their checksums beside that. A folder is called OUTPUT.part until all parts
+are there and all files are whole:
 
     .lock          held exclusively by a process that is alone or finishes, else shared
     .start         held for a moment by a process that begins or ends
     .parts/job.json    what the bytes depend on
     .parts/00003       part 3 is complete; formats keep beside it what `finish` needs of it
+    .parts/00003.sums  sizes and sums of its files
+    .parts/whole-00002 the numbers of file 2 of the data set have its checksum
 
 A run that was stopped or killed leaves OUTPUT.part. The next one goes on with it if it writes the
 same, and is told to or is one of many processes of a scheduler; otherwise it removes it.
@@ -23,11 +26,13 @@ import os
 import shutil
 import threading
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Callable, Iterator, Protocol
 
 from . import _core
 from ._export_pool import Pool
+from ._export_sums import Sums, joined, stored, sums_of
 
 Progress = Callable[[int, int], None]  # frames that are written, frames of this process
 
@@ -41,6 +46,8 @@ class Format(Protocol):
     parts: list[int]  #: frames of each
     names: list[str]  #: of its arrays
     fps: int  #: frames a second
+    by_folder: bool  #: whether its files are counted for each folder
+    common: list[str]  #: files that belong to no part, of those that have sums
 
     def job(self) -> dict[str, Any]:
         """All that the bytes depend on, without the data set."""
@@ -50,6 +57,9 @@ class Format(Protocol):
 
     def write(self, folder: Path, part: int) -> None:
         """Writes a part. It may find files of it that a killed run has left."""
+
+    def files(self, part: int) -> list[str]:
+        """Those that `write` makes of a part, below the folder; some need not be there."""
 
     def finish(self, folder: Path) -> None:
         """Joins the parts; they are all there."""
@@ -61,30 +71,72 @@ def identity(job: dict[str, Any]) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
+@dataclass
+class Work:
+    """What processes do for an export: they check each file of the data set, and write each part."""
+
+    format: Format
+    sources: list[Path]  #: files of the data set
+    folder: Path  #: OUTPUT.part
+
+    def tasks(self) -> list[str]:
+        """Checks come first, so that damage is found early."""
+        checks = [f"whole-{number:05d}" for number in range(len(self.sources))]
+        return checks + [f"{part:05d}" for part in range(len(self.format.parts))]
+
+    def frames(self, task: str) -> int:
+        """That a task writes."""
+        return self.format.parts[int(task)] if task.isdecimal() else 0
+
+    def do(self, task: str) -> None:
+        if task.isdecimal():
+            part = int(task)
+            self.format.write(self.folder, part)
+            sums = sums_of(self.folder, self.format.files(part), self.format.by_folder)
+            self._sums_of(task).write_text(json.dumps(sums))
+            return
+        try:
+            _core.check_shard(self.sources[int(task.removeprefix("whole-"))])
+        except _core.IoError as error:
+            raise _core.IoError(
+                f"{error}; remove the file, and make it again with the command of the data set and "
+                "--resume"
+            ) from None
+
+    def sums(self) -> Sums:
+        """Of all files, after `Format.finish`."""
+        parts = [task for task in self.tasks() if task.isdecimal()]
+        common = sums_of(self.folder, self.format.common, self.format.by_folder)
+        return joined([*(json.loads(self._sums_of(part).read_text()) for part in parts), common])
+
+    def _sums_of(self, part: str) -> Path:
+        return self.folder / f".parts/{part}.sums"
+
+
 def run(
-    format: Format, job: dict[str, Any], output: Path, *, overwrite: bool, resume: bool,
-    workers: int, progress: Progress | None,
+    format: Format, job: dict[str, Any], output: Path, *, sources: list[Path], overwrite: bool,
+    resume: bool, workers: int, progress: Progress | None,
 ) -> bool:  # fmt: skip
     """Writes `output`. Returns whether it is complete: if other processes write parts of it, the
     one that ends last completes it.
 
-    Raises InputError if `output` is there and is not to be replaced, or is of another kind, and if
-    other processes write something else there.
+    `sources`: files of the data set. Raises IoError if the numbers of one of them do not have its
+    checksum, InputError if `output` is there and is not to be replaced, or is of another kind, and
+    if other processes write something else there.
     """
     index, count, _ = _core.worker_from_environment()
-    folder = Folder(output, format, identity(job), overwrite)
+    folder = Folder(output, format, identity(job), overwrite, sources)
     if (resume or count > 1) and folder.is_done():
         folder.remove_old()
         return True
     if count == 1:
         with folder.alone(resume):
-            _write(format, folder, list(range(len(format.parts))), workers, progress)
+            _do(folder, folder.work.tasks(), workers, progress)
             folder.finish()
         return True
-    mine = list(range(index, len(format.parts), count))
     try:
         with folder.shared():
-            _write(format, folder, mine, workers, progress)
+            _do(folder, folder.work.tasks()[index::count], workers, progress)
         return folder.finish_if_last()
     except (FileNotFoundError, _core.InputError):
         if folder.is_done():  # another process has completed it meanwhile
@@ -92,41 +144,44 @@ def run(
         raise
 
 
-def _write(
-    format: Format, folder: Folder, parts: list[int], workers: int, progress: Progress | None
-) -> None:
-    wanted = [part for part in parts if not folder.has(part)]
-    total = sum(format.parts[part] for part in parts)
-    done = total - sum(format.parts[part] for part in wanted)
+def _do(folder: Folder, tasks: list[str], workers: int, progress: Progress | None) -> None:
+    work = folder.work
+    wanted = [task for task in tasks if not folder.has(task)]
+    total = sum(map(work.frames, tasks))
+    done = total - sum(map(work.frames, wanted))
     lock = threading.Lock()
 
-    def end(part: int) -> None:
+    def end(task: str) -> None:
         nonlocal done
-        folder.mark(part)
+        folder.mark(task)
         with lock:
-            done += format.parts[part]
+            done += work.frames(task)
             if progress:
                 progress(done, total)
 
     if progress:
         progress(done, total)
-    if min(workers, len(wanted)) <= 1:
-        for part in wanted:
-            format.write(folder.part, part)
-            end(part)
+    processes = min(workers, len(wanted))
+    if processes <= 1:
+        for task in wanted:
+            work.do(task)
+            end(task)
         return
-    Pool(format, folder.part, min(workers, len(wanted)), folder.lock).run(wanted, end)
+    Pool(work, processes, folder.lock).run(wanted, end)
 
 
 class Folder:
     """OUTPUT.part and how it gets its name."""
 
-    def __init__(self, output: Path, format: Format, name: str, overwrite: bool):
+    def __init__(
+        self, output: Path, format: Format, name: str, overwrite: bool, sources: list[Path]
+    ):
         self.output, self._format, self._name, self._overwrite = output, format, name, overwrite
         self.lock = -1  # the descriptor of the lock, while it is held
         self.part, self._old = (
             output.with_name(output.name + end) for end in (".part", ".old.part")
         )
+        self.work = Work(format, sources, self.part)
 
     def is_done(self) -> bool:
         """Whether `output` is complete and what this job writes."""
@@ -140,11 +195,14 @@ class Folder:
         if self._old.exists() and self.output.exists():
             shutil.rmtree(self._old, ignore_errors=True)
 
-    def has(self, part: int) -> bool:
-        return (self.part / f".parts/{part:05d}").is_file()
+    def has(self, task: str) -> bool:
+        return (self.part / ".parts" / task).is_file()
 
-    def mark(self, part: int) -> None:
-        (self.part / f".parts/{part:05d}").touch()
+    def mark(self, task: str) -> None:
+        (self.part / ".parts" / task).touch()
+
+    def _left(self) -> list[str]:
+        return [task for task in self.work.tasks() if not self.has(task)]
 
     @contextmanager
     def alone(self, resume: bool) -> Iterator[None]:
@@ -195,7 +253,7 @@ class Folder:
             fcntl.flock(start, fcntl.LOCK_EX)
             if not self.part.is_dir() or self._job() != self._name:
                 return self.is_done()
-            if not all(self.has(part) for part in range(len(self._format.parts))):
+            if self._left():
                 return False
             if not _locked(lock, fcntl.LOCK_EX):
                 return False  # another process ends soon, and finishes
@@ -204,16 +262,15 @@ class Folder:
 
     def finish(self) -> None:
         """Joins the parts and gives the folder its name."""
+        if left := self._left():
+            raise _core.IoError(f"part {left[0]} of {self.output} was not written")
         self._format.finish(self.part)
         path = self.part / self._format.origin
         said = json.loads(path.read_text(encoding="utf-8"))
         new = path.with_name(path.name + ".new")
         new.unlink(missing_ok=True)
-        write_json(new, said | {"job": self._name})
+        write_json(new, said | {"job": self._name, "stored": stored(self.work.sums())})
         new.replace(path)
-        missing = [part for part in range(len(self._format.parts)) if not self.has(part)]
-        if missing:
-            raise _core.IoError(f"part {missing[0]} of {self.output} was not written")
         shutil.rmtree(self.part / ".parts")
         if self.output.exists():
             self.output.rename(self._old)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Processes that write parts of an export.
+"""Processes that do the tasks of an export: check a file of the data set, write a part.
 
 They are new Pythons, not forks: a fork of a process with threads may hang, and a process that
-`multiprocessing` starts runs the caller's program again. A process reads a pickled format and then
-numbers of parts from its standard input, and answers each with a line of JSON. It ends when its
+`multiprocessing` starts runs the caller's program again. A process reads the pickled work and then
+names of tasks from its standard input, and answers each with a line of JSON. It ends when its
 standard input does, so none outlives a caller that was killed. Until then it holds the lock of the
 folder, whose descriptor it inherits.
 """
@@ -17,7 +17,6 @@ import queue
 import subprocess
 import sys
 import threading
-from pathlib import Path
 from typing import Any, Callable, Sequence
 
 from . import _core
@@ -29,20 +28,20 @@ _ERRORS: dict[str, type[BaseException]] = {
 
 
 class Pool:
-    """Writes parts of `format` into `folder` with `workers` processes, which inherit `lock`."""
+    """Does tasks of `work` with `workers` processes, which inherit `lock`."""
 
-    def __init__(self, format: Any, folder: Path, workers: int, lock: int):
+    def __init__(self, work: Any, workers: int, lock: int):
         self._workers, self._lock = workers, lock
-        self._setting = pickle.dumps((format, folder))
-        self._left: queue.SimpleQueue[int] = queue.SimpleQueue()
+        self._setting = pickle.dumps(work)
+        self._left: queue.SimpleQueue[str] = queue.SimpleQueue()
         self._failed: list[BaseException] = []
         self._processes: list[subprocess.Popen[bytes]] = []
 
-    def run(self, parts: Sequence[int], end: Callable[[int], None]) -> None:
-        """Calls `end` with each part that is complete, from several threads. Raises what the first
+    def run(self, tasks: Sequence[str], end: Callable[[str], None]) -> None:
+        """Calls `end` with each task that is done, from several threads. Raises what the first
         process that failed has raised."""
-        for part in parts:
-            self._left.put(part)
+        for task in tasks:
+            self._left.put(task)
         threads = [threading.Thread(target=self._feed, args=(end,)) for _ in range(self._workers)]
         try:
             for thread in threads:
@@ -58,7 +57,7 @@ class Pool:
         if self._failed:
             raise self._failed[0]
 
-    def _feed(self, end: Callable[[int], None]) -> None:
+    def _feed(self, end: Callable[[str], None]) -> None:
         path = os.pathsep.join(path for path in sys.path if path)
         alone = {"PYTHONPATH": path, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
         try:
@@ -72,23 +71,23 @@ class Pool:
             return
         self._processes.append(process)
         assert process.stdin and process.stdout
-        part = None
+        task = ""
         try:
             process.stdin.write(len(self._setting).to_bytes(8, "little") + self._setting)
             while not self._failed:
                 try:
-                    part = self._left.get_nowait()
+                    task = self._left.get_nowait()
                 except queue.Empty:
                     break
-                process.stdin.write(b"%d\n" % part)
+                process.stdin.write(f"{task}\n".encode())
                 process.stdin.flush()
                 answer = json.loads(process.stdout.readline() or b"{}")
-                if answer.get("part") != part:
-                    raise _error_of(answer, part, process)
-                end(part)
+                if answer.get("task") != task:
+                    raise _error_of(answer, task, process)
+                end(task)
             process.stdin.close()
         except BrokenPipeError:
-            self._fail(_error_of({}, part, process))
+            self._fail(_error_of({}, task, process))
         except BaseException as error:
             self._fail(error)
         finally:
@@ -107,13 +106,13 @@ class Pool:
 
 
 def _error_of(
-    answer: dict[str, Any], part: int | None, process: subprocess.Popen[bytes]
+    answer: dict[str, Any], task: str, process: subprocess.Popen[bytes]
 ) -> BaseException:
     if "error" in answer:
         kind = _ERRORS[answer["error"]]
         return kind(*answer["arguments"])
     return _core.IoError(
-        f"the process that wrote part {part} of an export ended with code {process.wait()}"
+        f"the process that did part {task} of an export ended with code {process.wait()}"
     )
 
 
@@ -121,24 +120,24 @@ def serve() -> None:
     """What a process of the pool does, until its standard input ends."""
     out, sys.stdout = sys.stdout, sys.stderr  # nothing else may answer
     source = sys.stdin.buffer
-    format, folder = pickle.loads(source.read(int.from_bytes(source.read(8), "little")))
-    parts: queue.SimpleQueue[int] = queue.SimpleQueue()
+    work = pickle.loads(source.read(int.from_bytes(source.read(8), "little")))
+    tasks: queue.SimpleQueue[str] = queue.SimpleQueue()
 
     def listen() -> None:
         for line in source:
-            parts.put(int(line))
-        os._exit(0)  # every part is answered, or the caller is gone
+            tasks.put(line.decode().strip())
+        os._exit(0)  # every task is answered, or the caller is gone
 
     threading.Thread(target=listen, daemon=True).start()
     while True:
-        out.write(json.dumps(_answer(format, folder, parts.get())) + "\n")
+        out.write(json.dumps(_answer(work, tasks.get())) + "\n")
         out.flush()
 
 
-def _answer(format: Any, folder: Path, part: int) -> dict[str, Any]:
+def _answer(work: Any, task: str) -> dict[str, Any]:
     try:
-        format.write(folder, part)
-        return {"part": part}
+        work.do(task)
+        return {"task": task}
     except (_core.InputError, _core.IoError) as error:
         return {"error": type(error).__name__, "arguments": [str(error)]}
     except OSError as error:

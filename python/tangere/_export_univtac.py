@@ -35,18 +35,21 @@ from ._export_ftp1 import joint_places
 from ._export_job import sync, write_json
 
 _EPISODES = 16  # of a part
+_PATH = "hdf5/{}.hdf5"
 _QUALITY = 95  # of JPEG, what OpenCV takes unless told
 
 
 class UniVtac:
     """The format.
 
-    joints: coordinates of the robot with commas, of `q_names`. None: all of q.
+    joints: coordinates of the robot with commas, of `q_names`. None: those of joints with a motor.
+    privileged: all of q comes along, under a name that UniVTAC's reader does not read.
     """
 
     kind, sign, origin = "UniVTAC data set", "metadata.json", "metadata.json"
+    by_folder, common = False, list[str]()
 
-    def __init__(self, frames: Frames, joints: str | None = None):
+    def __init__(self, frames: Frames, joints: str | None = None, privileged: bool = False):
         episodes, self.frames = frames.episodes, frames
         if frames.window > 1:
             raise _core.InputError("univtac with a window; expected one row of touch a frame")
@@ -87,7 +90,7 @@ class UniVtac:
         (folder / "hdf5").mkdir()
 
     def write(self, folder: Path, part: int) -> None:
-        for place in range(self._cuts[part], self._cuts[part + 1]):
+        for place in self._places(part):
             found = self._arrays(self.frames.of(place))
             memory = io.BytesIO()
             with h5py.File(memory, "w", track_order=False) as file:
@@ -98,9 +101,15 @@ class UniVtac:
                             "finite; see `tangere validate`"
                         )
                     file.create_dataset(name, data=rows, track_times=False)
-            with open(folder / f"hdf5/{place}.hdf5", "wb") as out:
+            with open(folder / _PATH.format(place), "wb") as out:
                 out.write(memory.getbuffer())
                 sync(out)
+
+    def files(self, part: int) -> list[str]:
+        return [_PATH.format(place) for place in self._places(part)]
+
+    def _places(self, part: int) -> range:
+        return range(self._cuts[part], self._cuts[part + 1])
 
     def finish(self, folder: Path) -> None:
         """What the data set is."""
@@ -111,6 +120,7 @@ class UniVtac:
             "tangere_version": str(episodes.attributes["tangere_version"]),
             "task": episodes.task,
             "seconds_per_frame": frames.seconds,
+            "frames": len(frames),
             "joints": [str(episodes.attributes["q_names"][i]) for i in self._joints],
             "joint_units": [str(episodes.attributes["q_units"][i]) for i in self._joints],
             **frames.scene_note(),

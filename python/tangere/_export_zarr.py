@@ -19,6 +19,7 @@ import zarr
 
 from . import _core
 from ._export_frames import Arrays, Frames, unit_and_meaning
+
 _CHUNK_BYTES = 1 << 20  # of a chunk, at most, where a row is smaller
 _PART_BYTES = 1 << 26  # of the numbers of a part
 _MOST_ROWS = 4096  # of a chunk
@@ -36,10 +37,13 @@ class ZarrStore:
     """What formats in Zarr share. They add `columns` and `arrays`."""
 
     kind, sign, origin = "Zarr data set", ".zgroup", ".zattrs"
+    by_folder, common = True, ["meta/episode_ends/0"]
     fps: int
 
-    def __init__(self, frames: Frames, columns: dict[str, Column]):
-        self.frames, self.columns = frames, columns
+    def __init__(
+        self, frames: Frames, columns: dict[str, Column], said: dict[str, Any] | None = None
+    ):
+        self.frames, self.columns, self._said = frames, columns, said or {}
         self.names = list(columns)
         self.fps = max(1, round(1 / frames.seconds))
         sizes = [_bytes_of(column) for column in columns.values()]
@@ -70,18 +74,19 @@ class ZarrStore:
                 "tangere_version": str(episodes.attributes["tangere_version"]),
                 "seconds_per_frame": self.frames.seconds,
                 "window": self.frames.window,
+                "frames": len(self.frames),
                 "demos": [episodes.names[i] for i in self.frames.chosen],
                 "touch": episodes.touch,
                 "privileged": episodes.privileged,
+                **self._said,
                 **self.frames.scene_note(),
             }
         )
         data = root.create_group("data")
         for name, column in self.columns.items():
-            rows = _power_below(_CHUNK_BYTES // _bytes_of(column))
             data.create_array(
                 name, shape=(len(self.frames), *column.shape), dtype=column.dtype,
-                chunks=(min(max(rows, 1), self._rows), *column.shape),
+                chunks=(self._chunk_rows(column), *column.shape),
                 compressors=numcodecs.Blosc("lz4", 5), attributes=column.attributes,
             )  # fmt: skip
         meta = root.create_group("meta")
@@ -109,40 +114,71 @@ class ZarrStore:
             assert isinstance(array, zarr.Array)
             array[start:stop] = rows
 
+    def files(self, part: int) -> list[str]:
+        names, start = [], part * self._part
+        for name, column in self.columns.items():
+            rows, rest = self._chunk_rows(column), ".0" * len(column.shape)
+            chunks = range(start // rows, -(-(start + self.parts[part]) // rows))
+            names += [f"data/{name}/{chunk}{rest}" for chunk in chunks]
+        return names
+
+    def _chunk_rows(self, column: Column) -> int:
+        rows = _power_below(_CHUNK_BYTES // _bytes_of(column))
+        return min(max(rows, 1), self._rows)
+
     def finish(self, folder: Path) -> None:
         """Nothing is left to do: every part has written its chunks."""
 
 
 class Zarr(ZarrStore):
     """The format. Observations keep their names, shapes and types; beside them are "action",
-    "reward", "done" and, of a task, "success".
+    "reward", "done" and, of a task, "success". Of q and v of a scene "q" and "v" have the
+    coordinates of joints with a motor, if there are any, "q_privileged" and "v_privileged" the rest.
 
     privileged: observations that a robot could not measure come along.
     """
 
     def __init__(self, frames: Frames, privileged: bool = False):
         episodes = frames.episodes
-        self._keys = [
-            key for key in episodes.keys if privileged or key not in episodes.privileged
-        ]  # fmt: skip
-        self._others = {"action": "actions", "reward": "rewards", "done": "dones"}
-        self._others |= {"success": "success"} if episodes.task else {}
-        clash = [key for key in self._keys if key in self._others]
+        measured, hidden = frames.split()
+        sources = {key: key for key in episodes.keys
+                   if key in measured or key not in episodes.privileged}  # fmt: skip
+        rest = {f"{key}_privileged" if key in measured else key: key for key in hidden}
+        sources |= rest if privileged else {}
+        self._numbers = {key: places for key, places in measured.items() if key in sources}
+        self._numbers |= {f"{key}_privileged": hidden[key] for key in hidden if key in measured}
+        others = {"action": "actions", "reward": "rewards", "done": "dones"}
+        others |= {"success": "success"} if episodes.task else {}
+        clash = [name for name in sources if name in others]
+        clash += [name for name in rest if name in episodes.keys and name != rest[name]]
         if clash:
             raise _core.InputError(
                 f"{episodes.path}: an observation is called {clash[0]!r}, which the format has for "
                 "something else; expected another name of the sensor"
             )
-        about = attributes_of(frames)
-        sources = {key: key for key in self._keys} | self._others
+        about, self._sources = attributes_of(frames), sources | others
+        said = {"privileged": [name for name in rest if name in sources]}
         super().__init__(frames, {
-            name: Column(frames.shapes[source], frames.types[source], about.get(name, {}))
-            for name, source in sources.items()
-        })  # fmt: skip
-        self._sources = sources
+            name: Column(
+                (len(self._numbers[name]),) if name in self._numbers else frames.shapes[source],
+                frames.types[source],
+                self._chosen(name, about.get(source if source in about else name, {})),
+            )
+            for name, source in self._sources.items()
+        }, said)  # fmt: skip
+
+    def _chosen(self, name: str, about: dict[str, Any]) -> dict[str, Any]:
+        """What is said of those numbers of a vector that an array has."""
+        if name not in self._numbers:
+            return about
+        lists = {what: [about[what][k] for k in self._numbers[name]] for what in ("names", "units")}
+        return about | lists
 
     def arrays(self, frames: Arrays, start: int) -> Arrays:
-        return {name: frames[source] for name, source in self._sources.items()}
+        return {
+            name: frames[source][:, self._numbers[name]] if name in self._numbers else frames[source]
+            for name, source in self._sources.items()
+        }
 
 
 def attributes_of(frames: Frames) -> dict[str, dict[str, Any]]:

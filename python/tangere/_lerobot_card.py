@@ -6,8 +6,8 @@ from __future__ import annotations
 import json
 from typing import Any, Sequence
 
-from ._export_frames import Frames, unit_and_meaning
-from ._lerobot_features import Feature
+from ._export_frames import Frames, hidden_in_words, names_of, unit_and_meaning
+from ._lerobot_features import STATE, Feature
 from .data import Episodes
 
 
@@ -43,6 +43,7 @@ def card(
         "## Columns",
         "",
         *_columns(episodes, features),
+        *_left_out(frames, features),
     ]
     if episodes.sensors:
         lines += ["", "## Sensors", "", *_sensors(episodes)]
@@ -97,10 +98,19 @@ def _columns(episodes: Episodes, features: Sequence[Feature]) -> list[str]:
             if feature.is_picture and feature.range:
                 ranges = ", ".join(f"{x:g}" for x in feature.range)
                 what += f", pad {feature.pad}: 0, 128 and 255 are -range, 0 and range, ({ranges})"
+            if key in feature.numbers:
+                moved = "with a motor" if feature.name == STATE else "without a motor"
+                what += f" of joints {moved}: {', '.join(names_of(episodes, key, feature.numbers[key]))}"
             unit, meaning = unit_and_meaning(episodes, key)
             what += f" [{unit}]" if unit else ""
             lines.append(f"  - {what}" + (f": {meaning}" if meaning else ""))
     return lines
+
+
+def _left_out(frames: Frames, features: Sequence[Feature]) -> list[str]:
+    written = {key for feature in features if feature.name != STATE for key in feature.keys}
+    hidden = hidden_in_words(frames, written)
+    return ["", f"Left out, because a robot could not measure them: {hidden}."] if hidden else []
 
 
 def _sensors(episodes: Episodes) -> list[str]:

@@ -49,6 +49,7 @@ class Feature:
     """A column: the arrays that it is made of, and what info.json says of it.
 
     blocks: KEY → points along a side of a block, over which the key's reading is averaged.
+    numbers: KEY → places of the numbers of a vector that are taken; others are taken whole.
     pad, range: of a picture of touch: which pad it shows, and for each component x the number that
     255 means; 0 means -x. Without range a picture's bytes are those of the array.
     """
@@ -59,6 +60,7 @@ class Feature:
     dtype: str = "float32"
     names: list[str] | None = None
     blocks: dict[str, int] = field(default_factory=dict)
+    numbers: dict[str, list[int]] = field(default_factory=dict)
     pad: int = 0
     range: list[float] = field(default_factory=list)
 
@@ -83,6 +85,7 @@ class Feature:
         for key in self.keys:
             part = np.asarray(arrays[key])
             part = block_means(part, self.blocks[key]) if key in self.blocks else part
+            part = part[:, self.numbers[key]] if key in self.numbers else part
             parts.append(part.astype(self.dtype, copy=False))
         if len(parts) > 1:
             parts = [np.concatenate([part.reshape(len(part), -1) for part in parts], axis=1)]
@@ -160,18 +163,23 @@ def features_of(
             f"is no picture in colours; its observations are {episodes.keys}"
         )
     _check_window(frames, felt if touch else [], touch)
-    hidden = [key for key in episodes.privileged if privileged and key not in shown]
+    measured, rest = frames.split()
+    hidden = [key for key in [*rest] if privileged and key not in shown]
     if touch is None:
-        features = _joined(STATE, [k for k in seen if k not in fields], episodes, shapes)
+        vectors = [k for k in episodes.keys if k in measured or (k in seen and k not in fields)]
+        features = _joined(STATE, vectors, episodes, shapes, numbers=measured)
         features += [Feature(f"observation.{key}", [key], shapes[key]) for key in fields]
-        features += _joined(ENVIRONMENT, hidden, episodes, shapes)
+        features += _joined(ENVIRONMENT, hidden, episodes, shapes, numbers=rest)
     else:
         whole = {key: max(shapes[key]) for key in felt}
         grid = {key: _least_block(shapes[key]) for key in felt} if touch == "state" else {}
         views = [key for key in fields if key.rpartition(".")[0] in episodes.cameras]
-        plain = [key for key in seen if key not in felt and key not in views]
-        features = _joined(STATE, plain + felt, episodes, shapes, whole)
-        features += _joined(ENVIRONMENT, [*grid, *hidden], episodes, shapes, grid)
+        plain = [
+            key for key in episodes.keys
+            if key in measured or (key in seen and key not in felt and key not in views)
+        ]  # fmt: skip
+        features = _joined(STATE, plain + felt, episodes, shapes, whole, measured)
+        features += _joined(ENVIRONMENT, [*grid, *hidden], episodes, shapes, grid, rest)
         features += [Feature(f"observation.{key}", [key], shapes[key]) for key in views]
         if touch == "image":
             features += [picture for key in felt for picture in _pictures(key, frames)]
@@ -195,23 +203,27 @@ def features_of(
 
 def _joined(
     name: str, keys: Sequence[str], episodes: Episodes, shapes: dict[str, tuple[int, ...]],
-    blocks: dict[str, int] | None = None,
+    blocks: dict[str, int] | None = None, numbers: dict[str, list[int]] | None = None,
 ) -> list[Feature]:  # fmt: skip
     """One vector of all `keys`, or none if there are no keys."""
     blocks = blocks or {}
+    taken = {key: places for key, places in (numbers or {}).items() if key in keys and places}
     names: list[str] = []
     for key in keys:
         shape = _blocked(shapes[key], blocks[key]) if key in blocks else shapes[key]
         mean = key in blocks and blocks[key] >= max(shapes[key])
         if key in ("q", "v"):
-            names += [str(said) for said in episodes.attributes[f"{key}_names"]]
+            said = [str(name) for name in episodes.attributes[f"{key}_names"]]
+            names += [said[k] for k in taken[key]] if key in taken else said
         elif shape == (1,):
             names.append(key)
         else:
             axes = [a for a in range(len(shape)) if not (mean and a in _grid_axes(shapes[key]))]
             title = f"{key}.mean" if mean else key
             names += [title + "".join(f"[{at[a]}]" for a in axes) for at in np.ndindex(*shape)]
-    return [Feature(name, list(keys), (len(names),), names=names, blocks=blocks)] if keys else []
+    if not keys:
+        return []
+    return [Feature(name, list(keys), (len(names),), names=names, blocks=blocks, numbers=taken)]
 
 
 def _check_window(frames: Frames, felt: Sequence[str], touch: Touch | None) -> None:

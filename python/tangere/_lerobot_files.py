@@ -24,6 +24,7 @@ from ._lerobot_features import BOOKKEEPING, Feature
 from ._png import png
 
 CHUNK = 1000  # files of a folder
+EPISODES, TASKS = "meta/episodes/chunk-000/file-000.parquet", "meta/tasks.parquet"
 _GROUP_BYTES = 1 << 25  # of rows that are written at once
 _SORTED = [name for name in BOOKKEEPING if name != "timestamp"]  # readers skip groups by these
 
@@ -135,7 +136,7 @@ def write_task(folder: Path, task: str) -> None:
     }
     table = pa.table({"task_index": pa.array([0], pa.int64()), "__index_level_0__": [task]})
     table = table.replace_schema_metadata({"pandas": json.dumps(said)})
-    file = Table(folder / "meta/tasks.parquet", table.schema)
+    file = Table(folder / TASKS, table.schema)
     for batch in table.to_batches():
         file.add(batch)
     file.close()

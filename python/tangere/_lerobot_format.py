@@ -15,7 +15,9 @@ from ._export_frames import Frames, unit_and_meaning
 from ._export_job import sync, write_json, write_text
 from ._lerobot_card import card
 from ._lerobot_features import BOOKKEEPING, Feature, Pictures, Touch, features_of
-from ._lerobot_files import CHUNK, Table, arrow_array, schema_of, write_episodes, write_task
+from ._lerobot_files import (
+    CHUNK, EPISODES, TASKS, Table, arrow_array, schema_of, write_episodes, write_task
+)  # fmt: skip
 from ._lerobot_statistics import Statistics, joined, moments, of_all, of_episodes
 
 VERSION = "v3.0"
@@ -27,6 +29,7 @@ class LeRobot:
     """The format, with the options of `tangere.lerobot.export`."""
 
     kind, sign, origin = "LeRobot data set", "meta/info.json", "meta/tangere.json"
+    by_folder, common = False, [EPISODES, TASKS, "meta/stats.json"]
 
     def __init__(
         self, frames: Frames, privileged: bool = False, touch: Touch | None = None,
@@ -70,8 +73,7 @@ class LeRobot:
         pa.set_cpu_count(1)
         frames = self.frames
         first, last = [0, *self._ends][part], self._ends[part]
-        chunk, number = divmod(part, CHUNK)
-        place = {"chunk_index": chunk, "file_index": number}
+        place = _place(part)
         before = int(frames.ends[first] - frames.lengths[first])
         counting = _Bookkeeping(self.fps, before)
         statistics = {f.name: Statistics(f, len(frames), before) for f in self.features}
@@ -108,6 +110,13 @@ class LeRobot:
             np.savez(file, **packed)
             sync(file)
 
+    def files(self, part: int) -> list[str]:
+        place = _place(part)
+        videos = [f.name for f in self.features if f.is_video]
+        return [_PATH.format(**place)] + [
+            _lerobot_video.PATH.format(video_key=name, **place) for name in videos
+        ]
+
     def _count(
         self, rows: dict[str, np.ndarray], statistics: dict[str, Statistics], start: int, stop: int
     ) -> None:
@@ -143,7 +152,7 @@ class LeRobot:
         (folder / "meta").mkdir(exist_ok=True)
         for name in ("README.md", "meta/stats.json", "meta/tangere.json", "meta/info.json"):
             (folder / name).unlink(missing_ok=True)
-        write_episodes(folder / "meta/episodes/chunk-000/file-000.parquet", table)
+        write_episodes(folder / EPISODES, table)
         write_task(folder, self.text)
         info = self._info([*self.features, *bookkeeping])
         solved = len(frames.solved & set(frames.chosen))
@@ -208,6 +217,7 @@ class LeRobot:
             "tangere_version": str(episodes.attributes["tangere_version"]),
             "seconds_per_action": frames.seconds,
             "window": frames.window,
+            "frames": len(frames),
             **({"windows": frames.windows} if frames.windows else {}),
             "demos": [episodes.names[i] for i in frames.chosen],
             "observation_scale": episodes.scale,
@@ -280,6 +290,11 @@ _NONE = moments(np.zeros((1, 1)))
 
 def _moved(found: dict[str, np.ndarray], by: int) -> dict[str, np.ndarray]:
     return {name: values if name == "square" else values + by for name, values in found.items()}
+
+
+def _place(part: int) -> dict[str, int]:
+    chunk, number = divmod(part, CHUNK)
+    return {"chunk_index": chunk, "file_index": number}
 
 
 def task_text(frames: Frames, text: str | None) -> str:

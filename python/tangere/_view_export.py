@@ -43,6 +43,7 @@ def page(
     not have.
     """
     path = Path(path)
+    _core.check_export(path)
     export = _open(path)
     count = len(export.lengths)
     if episode is not None and not 0 <= episode < count:
@@ -89,8 +90,10 @@ def _open(path: Path) -> _Export:
         )
     try:
         return _ORIGINS[name](path, said)
-    except (KeyError, TypeError) as error:
-        raise _core.IoError(f"{path} is damaged: {error!r}") from None
+    except ModuleNotFoundError:
+        raise
+    except Exception as error:  # whatever the library of the format raises for damaged bytes
+        raise _core.IoError(f"'{path}' is damaged: {error!r}") from error
 
 
 def _zarr(path: Path, said: dict[str, Any]) -> _Export:

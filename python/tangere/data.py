@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Data sets of `tangere generate` for learning: windows of rows, scaled, as PyTorch reads them.
 
-Needs h5py (`pip install tangere[data]`). PyTorch is not needed: `Windows` has the interface of
+Needs h5py (`pip install h5py`). PyTorch is not needed: `Windows` has the interface of
 `torch.utils.data.Dataset`, and its items are NumPy arrays, which PyTorch's loader collates.
 """
 
@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import os
 from collections import OrderedDict
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Any, Iterator, Literal, Sequence
 
@@ -44,29 +45,28 @@ class Episodes:
     def __init__(self, path: str | Path):
         self.path = Path(path)
         one = self.path.is_file()
-        shards = [self.path] if one else sorted(self.path.glob("shard-*.h5"))
-        if not shards:
+        self.files = [self.path] if one else sorted(self.path.glob("shard-*.h5"))  #: that are read
+        if not self.files:
             raise _core.InputError(
                 f"{self.path}: no shard-*.h5; expected a folder of `tangere generate`, or one of "
                 "its files"
             )
         self.masks = self.path if one else self.path / "robomimic.hdf5"
-        self._shards = shards
         self.names: list[str] = []  # demo_0, demo_1 … in order
         self._shard_of: list[int] = []
         lengths: list[int] = []
         self.attributes: dict[str, Any] = {}
         self.content = 0  # the checksum of all numbers, as of robomimic.hdf5
         found = []
-        for number, shard in enumerate(shards):
-            with h5py.File(shard, "r") as file:
+        for number, shard in enumerate(self.files):
+            with _damage_named(shard), h5py.File(shard, "r") as file:
                 if number == 0:
                     if "dataset_shards" not in file.attrs:
                         raise _core.InputError(f"{shard} is no file of `tangere generate`")
                     expected = 1 if one else int(file.attrs["dataset_shards"])
-                    if expected != len(shards):
+                    if expected != len(self.files):
                         raise _core.InputError(
-                            f"{self.path} has {len(shards)} shards of {expected}; expected all, "
+                            f"{self.path} has {len(self.files)} shards of {expected}; expected all, "
                             "see `tangere generate --resume`"
                         )
                     self.attributes = dict(file["scene"].attrs)
@@ -103,6 +103,7 @@ class Episodes:
         self.task = str(scene["task"]) if "success" in scene else ""  # of a scene alone
         self.scale: dict[str, Any] = {key: 1.0 for key in self.keys}
         self.privileged = [key for key in ("q", "v") if key in self.keys]
+        self.actuated = json.loads(scene.get("actuated_joints", "[]"))  # joints with a motor
         self.touch: list[str] = []
         steps = zip(scene.get("windows", ()), scene.get("window_every", ()))
         self.windows = {str(key): float(scene["timestep"]) * int(every) for key, every in steps}
@@ -172,6 +173,18 @@ class Episodes:
         values = self._demo(episode).attrs["randomized"] if names else ()
         return dict(zip(names, map(float, values), strict=True))
 
+    def driven(self, key: str) -> list[int]:
+        """Places of the numbers of "q" or "v" that belong to joints that motors move."""
+        names = (str(name) for name in self.attributes[f"{key}_names"])
+        return [k for k, name in enumerate(names) if name.rpartition(".")[0] in self.actuated]
+
+    def measured(self, key: str) -> list[int]:
+        """Those of a privileged "q" or "v" of a scene that a robot measures: see `driven`. A task
+        declares what it shows, so there are none of it."""
+        if self.task or key not in ("q", "v") or key not in self.privileged:
+            return []
+        return self.driven(key)
+
     def terminated(self, episode: int) -> bool:
         """Whether the task ended the episode; False if it ran out of time, and for a scene."""
         return bool(self._demo(episode).attrs.get("terminated", 0))
@@ -208,8 +221,9 @@ class Episodes:
             return self._open[episode]
         demo = self._demo(episode)
         again = {key.replace(".", "_") for key in self.keys} - set(self.keys)  # merged files have
-        arrays = {key: self._array(episode, demo["obs"][key])
-                  for key in demo["obs"] if key not in again}  # fmt: skip
+        with self._reading(episode):
+            arrays = {key: self._array(episode, demo["obs"][key])
+                      for key in demo["obs"] if key not in again}  # fmt: skip
         for name, item in demo.items():
             if not isinstance(item, h5py.Dataset):
                 continue
@@ -218,7 +232,8 @@ class Episodes:
                     f"{self.path}: an observation is called {name!r}, as an array of every episode "
                     "is; expected another name of the sensor"
                 )
-            arrays[name] = self._array(episode, item)
+            with self._reading(episode):
+                arrays[name] = self._array(episode, item)
         self._open[episode] = arrays
         self._held += _copied(arrays)
         while self._held > _CACHED_BYTES and len(self._open) > 1:
@@ -227,24 +242,27 @@ class Episodes:
 
     def arrays(self, episode: int, names: Sequence[str]) -> dict[str, np.ndarray]:
         """Some of the arrays that `episodes[episode]` has: quicker for many episodes in order."""
-        if not self._mapped or episode in self._open:
-            whole = self[episode]
-            return {name: whole[name] for name in names}
-        demo = self._demo(episode).id
-        found = {}
-        for name in names:
-            path = (f"obs/{name}" if name in self.keys else name).encode()
-            stored = h5py.h5d.open(demo, path)
-            if name not in self._rows:
-                like = h5py.Dataset(stored)
-                self._rows[name] = (like.shape[1:], like.dtype)
-            shape, dtype = self._rows[name]
-            if stored.get_offset() is None or dtype.kind not in "fiu":
-                found[name] = _values(h5py.Dataset(stored))
-                continue
-            raw = self._bytes(episode, stored.get_offset(), stored.get_storage_size())
-            found[name] = raw.view(dtype).reshape(-1, *shape)
-        return found
+        with self._reading(episode):
+            if not self._mapped or episode in self._open:
+                whole = self[episode]
+                return {name: whole[name] for name in names}
+            demo = self._demo(episode).id
+            return {name: self._plain(episode, demo, name) for name in names}
+
+    def _plain(self, episode: int, demo: h5py.h5g.GroupID, name: str) -> np.ndarray:
+        """An array of an episode, without what h5py's own objects of it cost."""
+        stored = h5py.h5d.open(demo, (f"obs/{name}" if name in self.keys else name).encode())
+        if name not in self._rows:
+            like = h5py.Dataset(stored)
+            self._rows[name] = (like.shape[1:], like.dtype)
+        shape, dtype = self._rows[name]
+        if stored.get_offset() is None or dtype.kind not in "fiu":
+            return _values(h5py.Dataset(stored))
+        raw = self._bytes(episode, stored.get_offset(), stored.get_storage_size())
+        return raw.view(dtype).reshape(-1, *shape)
+
+    def _reading(self, episode: int) -> AbstractContextManager[None]:
+        return _damage_named(self.files[self._shard_of[episode]])
 
     def _here(self) -> None:
         """After a fork the child opens its own files: HDF5 does not share them."""
@@ -254,9 +272,10 @@ class Episodes:
     def _demo(self, episode: int) -> h5py.Group:
         self._here()
         number = self._shard_of[episode]
-        if number not in self._files:
-            self._files[number] = h5py.File(self._shards[number], "r")
-        return self._files[number]["data"][self.names[episode]]
+        with self._reading(episode):
+            if number not in self._files:
+                self._files[number] = h5py.File(self.files[number], "r")
+            return self._files[number]["data"][self.names[episode]]
 
     def _array(self, episode: int, dataset: h5py.Dataset) -> np.ndarray:
         offset = dataset.id.get_offset()
@@ -269,12 +288,25 @@ class Episodes:
     def _bytes(self, episode: int, offset: int, size: int) -> np.ndarray:
         number = self._shard_of[episode]
         if number not in self._maps:
-            self._maps[number] = np.memmap(self._shards[number], mode="r")
+            self._maps[number] = np.memmap(self.files[number], mode="r")
         return self._maps[number][offset : offset + size]
 
     def __getstate__(self) -> dict[str, Any]:
         empty: dict[str, Any] = {"_maps": {}, "_files": {}, "_rows": {}, "_open": OrderedDict()}
         return self.__dict__ | empty | {"_held": 0}
+
+
+@contextmanager
+def _damage_named(path: Path) -> Iterator[None]:
+    """What reading a damaged file raises becomes an IoError that names the file."""
+    try:
+        yield
+    except (_core.InputError, _core.IoError, FileNotFoundError, PermissionError):
+        raise
+    except (OSError, KeyError, RuntimeError, TypeError, ValueError) as error:
+        raise _core.IoError(
+            f"'{path}' is damaged: {error}; `tangere validate` says what is wrong with it"
+        ) from error
 
 
 def _values(dataset: h5py.Dataset) -> np.ndarray:

@@ -26,7 +26,7 @@ from pathlib import Path
 from typing import Any, Callable, Literal, Sequence, get_args
 
 from . import _core, _export_job
-from ._export_frames import Frames
+from ._export_frames import Frames, hidden_in_words
 from ._generate import run_command
 from .data import Episodes, _none_left
 
@@ -91,9 +91,10 @@ def export(
     progress: called with frames written and all frames of this process.
     options: of the format: those that `tangere.lerobot.export` and docs/datasets.md name.
 
-    Raises InputError for a data set without episodes and for options that do not fit it, IoError or
-    OSError if reading or writing fails or a library is missing. Nothing is left under the name
-    `output` then.
+    Every file of the data set is read and compared with its checksum. Raises InputError for a data
+    set without episodes and for options that do not fit it, IoError or OSError if a file is damaged,
+    if reading or writing fails or a library is missing. Nothing is left under the name `output`
+    then.
     """
     if to not in get_args(To):
         raise _core.InputError(f"to {to!r}; expected one of {', '.join(get_args(To))}")
@@ -115,26 +116,26 @@ def export(
         "content": episodes.content,
     }  # fmt: skip
     complete = _export_job.run(
-        format, job, output,
+        format, job, output, sources=episodes.files,
         overwrite=overwrite, resume=resume, workers=count, progress=progress,
     )  # fmt: skip
     return Exported(
         str(output), to, complete, len(frames.lengths), len(frames), len(format.parts),
         format.fps, frames.seconds, format.names,
-        [*getattr(format, "notes", []), *_left_out(to, episodes, options)],
+        [*getattr(format, "notes", []), *_left_out(to, frames, options)],
     )  # fmt: skip
 
 
-def _left_out(to: To, episodes: Episodes, options: dict[str, Any]) -> list[str]:
+def _left_out(to: To, frames: Frames, options: dict[str, Any]) -> list[str]:
     """Notes about observations that this format is not given."""
     notes = []
-    hidden = [key for key in episodes.keys if key in episodes.privileged]
+    hidden = hidden_in_words(frames)
     if hidden and to in ("lerobot", "zarr") and not options.get("privileged"):
         notes.append(
-            f"left out, because a robot could not measure them: {', '.join(hidden)}; "
+            f"left out, because a robot could not measure them: {hidden}; "
             "--privileged writes them"
         )
-    thinned = [str(name) for name in episodes.attributes.get("samples", [])]
+    thinned = [str(name) for name in frames.episodes.attributes.get("samples", [])]
     if thinned:
         notes.append(f"left out, because they are not in every row: {', '.join(thinned)}")
     return notes
@@ -284,8 +285,6 @@ def main(arguments: Sequence[str] | None = None, prog: str = "python -m tangere.
         done = export(data, output, to, progress=line, **given)
     except _core.InputError as error:
         return fail(2, str(error))
-    except KeyError as error:
-        return fail(2, f"{data} is damaged: it has no {error}")
     except (OSError, _core.IoError) as error:
         return fail(3, str(error))
     except SystemExit:

@@ -4,9 +4,11 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import tangere
@@ -35,6 +37,26 @@ def generate(command, tmp_path_factory):
         return folder
 
     return run
+
+
+@pytest.fixture
+def spoil():
+    """Puts a NaN into demo_7 of box pushing, where something is felt, and corrects the checksum."""
+    h5py = pytest.importorskip("h5py", reason="h5py is not installed")
+
+    def change(folder: Path) -> None:
+        shard = folder / "shard-00000.h5"
+        with h5py.File(shard, "r+") as file:
+            tactile = file["data/demo_7/obs/tactile"]
+            row = int(np.flatnonzero(np.abs(tactile[()]).max((1, 2, 3)))[0])
+            tactile[row, 2, 1, 0] = np.nan
+        with pytest.raises(tangere.IoError) as error:
+            tangere._core.check_shard(shard)
+        (found,) = re.findall("numbers is ([0-9a-f]{16}); expected", str(error.value))
+        with h5py.File(shard, "r+") as file:
+            file.attrs["content_sum"] = np.uint64(int(found, 16))
+
+    return change
 
 
 @pytest.fixture(scope="session")

@@ -98,7 +98,8 @@ def test_damage_is_named(sets, info, tmp_path):
         ("zarr", shorten("meta/episode_ends/0"), "has 152 bytes; expected 20 numbers"),
         ("zarr", edit("data/action/.zarray", "<f4", "<z4"), "its dtype is '<z4'"),
         ("univtac", remove("hdf5/7.hdf5"), "has no hdf5/7.hdf5; expected 20 files"),
-        ("univtac", edit("metadata.json", '"steps": 100', '"steps": 99'), "100 rows; expected 99"),
+        ("univtac", edit("metadata.json", '"steps": 100', '"steps": 99'),
+         "its episodes have 1999 steps; expected 2000, its 'frames'"),
         ("csv", lambda path: path.write_text(path.read_text() + "1,2\n"), "line 2003 has 2 col"),
     ):  # fmt: skip
         assert message in damaged(to, change), (to, message)

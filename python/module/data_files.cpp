@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+// Whether files of data sets and of exports are whole.
+#include <nanobind/stl/filesystem.h>
+
+#include <filesystem>
+
+#include "io/dataset/shard_check.hpp"
+#include "io/export/exported_set.hpp"
+#include "python/module/module.hpp"
+
+namespace tangere::python {
+
+namespace nb = nanobind;
+using nb::literals::operator""_a;
+
+namespace {
+
+/// Keeps the GIL: h5py may share the library for HDF5 (episode_writer.cpp).
+void check_file(const std::filesystem::path& path) { check_shard(path.string()); }
+
+void check_export(const std::filesystem::path& path) { find_export(path.string()); }
+
+}  // namespace
+
+void add_data_files(nb::module_& m) {
+  m.def("check_shard", check_file, "path"_a,
+        "Reads a file of a data set whole. IoError: it cannot be read, or its numbers or its\n"
+        "description do not have the checksums that it stores; the message names both.");
+  m.def("check_export", check_export, "path"_a,
+        "Compares counts and sizes of the files of an export. IoError: one is missing or differs.");
+}
+
+}  // namespace tangere::python

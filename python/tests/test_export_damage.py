@@ -1,0 +1,237 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Damage: data sets that an export refuses, and exports whose damage `info`, `view` and `validate`
+find."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+
+import h5py
+import pytest
+
+import tangere
+from tangere import export as exports
+from tangere.data import Episodes
+
+pytest.importorskip("pyarrow", reason="pyarrow is not installed")
+pytest.importorskip("zarr", reason="zarr is not installed")
+pytest.importorskip("PIL.Image", reason="pillow is not installed")
+
+FORMATS = ["lerobot", "zarr", "ftp1", "univtac", "csv"]
+SUMS = r"checksum of its numbers is [0-9a-f]{16}; expected [0-9a-f]{16}"
+
+
+def flip(path, at):
+    with open(path, "r+b") as file:
+        file.seek(at)
+        (byte,) = file.read(1)
+        file.seek(at)
+        file.write(bytes([byte ^ 4]))
+
+
+def shorten(path, by=200):
+    os.truncate(path, path.stat().st_size - by)
+
+
+@pytest.fixture
+def damaged(generate, tmp_path):
+    """Makes a copy of a data set of four shards whose second one is changed."""
+    whole = generate("box_pushing", "--episodes", "50", "--seed", "5", "--shards", "4",
+                     "--record", "goal,tactile,q")  # fmt: skip
+
+    def copy(change):
+        folder = tmp_path / f"set{len(list(tmp_path.iterdir()))}"
+        shutil.copytree(whole, folder)
+        change(folder / "shard-00001.h5")
+        return folder
+
+    return copy
+
+
+def flip_number(shard):
+    with h5py.File(shard) as file:
+        demo = next(iter(file["data"].values()))
+        at = demo["obs/tactile"].id.get_offset() + 4000
+    flip(shard, at)
+
+
+def without_actions(shard):
+    with h5py.File(shard, "r+") as file:
+        del file["data"][next(iter(file["data"]))]["actions"]
+
+
+CHANGES = [
+    (flip_number, SUMS),
+    (shorten, "truncated"),
+    (without_actions, "'actions'"),
+]
+
+
+@pytest.mark.parametrize("to", ["lerobot", "zarr", "csv"])
+@pytest.mark.parametrize("change, message", CHANGES, ids=lambda x: getattr(x, "__name__", ""))
+def test_a_damaged_data_set_is_refused(damaged, command, tmp_path, to, change, message):
+    data = damaged(change)
+    kept = {path.name for path in tmp_path.iterdir()}
+    words = [command, "export", data, tmp_path / "out", "--to", to]
+    done = subprocess.run(words, capture_output=True, text=True,
+                          env=os.environ | {"TANGERE_PYTHON": sys.executable})  # fmt: skip
+    assert done.returncode == 3 and "Traceback" not in done.stderr, done.stderr
+    with pytest.raises(tangere.IoError, match=message) as error:
+        exports.export(data, tmp_path / "out", to)
+    for text in (done.stderr, str(error.value)):
+        assert str(data / "shard-00001.h5") in text and ("is damaged" in text or to == "csv")
+    if change is flip_number and to != "csv":
+        assert "make it again with the command of the data set and --resume" in done.stderr
+    assert {path.name for path in tmp_path.iterdir()} == kept
+
+
+def test_a_damaged_merged_file_is_refused(damaged, tmp_path):
+    data = damaged(flip_number) / "robomimic.hdf5"
+    with pytest.raises(tangere.IoError, match=f"robomimic.hdf5' is damaged: the {SUMS}"):
+        exports.export(data, tmp_path / "out", "zarr", workers=1)
+
+
+def test_one_episode_of_a_table_needs_its_own_shard_alone(damaged, command, tmp_path):
+    data = damaged(flip_number)
+    ours, theirs = (Episodes(path).names[0].removeprefix("demo_")
+                    for path in (data / "shard-00000.h5", data / "shard-00001.h5"))  # fmt: skip
+
+    def code(episode):
+        words = [command, "export", data, "--csv", tmp_path / "out.csv", "--episode", episode]
+        return subprocess.run(words, capture_output=True).returncode
+
+    assert (code(theirs), code(ours)) == (3, 0)
+
+
+def test_reading_a_damaged_shard_names_it(damaged):
+    data = damaged(without_actions)
+    episodes = Episodes(data)
+    for k, name in enumerate(episodes.names):
+        if name == Episodes(data / "shard-00001.h5").names[0]:
+            with pytest.raises(tangere.IoError, match="shard-00001.h5' is damaged: .*'actions'"):
+                episodes.arrays(k, ["actions"])
+    with pytest.raises(tangere.IoError, match="shard-00001.h5' is damaged: .*truncated"):
+        Episodes(damaged(shorten))
+
+
+@pytest.fixture(scope="module")
+def sets(pushes, tmp_path_factory):
+    """FORMAT → an export of 20 episodes of box pushing."""
+    folder = tmp_path_factory.mktemp("exports")
+    for to in FORMATS:
+        exports.export(pushes, folder / f"out.{to}", to)
+    return {to: folder / f"out.{to}" for to in FORMATS}
+
+
+PARQUET, EPISODES = "data/chunk-000/file-000.parquet", "meta/episodes/chunk-000/file-000.parquet"
+CHUNK = "data/tactile/0.0.0.0"
+GROUP = "data/right_tactile_data_tactile/0.0.0.0.0"
+
+
+def edit(old, new):
+    def change(path):
+        text = path.read_text()
+        assert old in text
+        path.write_text(text.replace(old, new, 1))
+
+    return change
+
+
+def remove(path):
+    path.unlink()
+
+
+def drop_last_row(path):
+    lines = path.read_text().splitlines(keepends=True)
+    path.write_text("".join(lines[:-1]))
+
+
+def end_in_a_number(path):
+    shorten(path, 2)
+
+
+DAMAGE = [
+    ("lerobot", PARQUET, shorten, f"{PARQUET}' is damaged: it has "),
+    ("lerobot", EPISODES, shorten, f"{EPISODES}' is damaged: it has "),
+    ("lerobot", "meta/stats.json", shorten, "stats.json' is damaged: it has "),
+    ("lerobot", EPISODES, remove, f"has no {EPISODES}"),
+    ("lerobot", "meta/info.json", edit('"total_frames": 2000', '"total_frames": 2001'),
+     "info.json' is damaged: it counts 2001 frames; expected 2000, as "),
+    ("zarr", CHUNK, shorten, f"{CHUNK}' is damaged: it has "),
+    ("zarr", CHUNK, remove, "data/tactile' is damaged: it has "),
+    ("zarr", "meta/episode_ends/0", remove, "episode_ends/0: cannot be opened"),
+    ("zarr", ".zattrs", edit('"frames": 2000', '"frames": 1999'), "it counts 2000 frames; expect"),
+    ("ftp1", GROUP, shorten, f"{GROUP}' is damaged: it has "),
+    ("ftp1", GROUP, remove, "data/right_tactile_data_tactile' is damaged: it has "),
+    ("univtac", "hdf5/13.hdf5", shorten, "hdf5/13.hdf5' is damaged: it has "),
+    ("univtac", "hdf5/13.hdf5", remove, "has no hdf5/13.hdf5"),
+    ("univtac", "metadata.json", edit('"frames": 2000', '"frames": 1990'),
+     "its episodes have 2000 steps; expected 1990"),
+    ("univtac", "metadata.json", edit('"bytes": [', '"bytes": [7,'), "lists of 'stored' differ"),
+    ("csv", "", drop_last_row, "it has 1999 rows of 20 episodes; expected 2000 of 20, as its"),
+    ("csv", "", end_in_a_number, "line 2002 does not end"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("to, name, change, message", DAMAGE)
+def test_damage_of_an_export_is_found(sets, command, tmp_path, to, name, change, message):
+    copy = tmp_path / f"out.{to}"
+    (shutil.copytree if sets[to].is_dir() else shutil.copyfile)(sets[to], copy)
+    change(copy / name if name else copy)
+    environment = os.environ | {"TANGERE_PYTHON": sys.executable}
+    for words in (["info", copy], ["view", copy, "-o", tmp_path / "page.html"], ["validate", copy]):
+        done = subprocess.run([command, *words], capture_output=True, text=True, env=environment)
+        assert done.returncode == 3, words
+        assert message in done.stderr, words
+    if to != "csv":
+        with pytest.raises(tangere.IoError, match="damaged|has no|cannot be opened"):
+            tangere.view(copy)
+    assert not (tmp_path / "page.html").exists()
+
+
+@pytest.mark.parametrize("to, name", [
+    ("lerobot", PARQUET), ("lerobot", EPISODES), ("zarr", CHUNK), ("ftp1", GROUP),
+    ("univtac", "hdf5/13.hdf5"),
+])  # fmt: skip
+def test_flipped_bytes_are_found_by_reading_all(sets, command, tmp_path, to, name):
+    copy = tmp_path / "out"
+    shutil.copytree(sets[to], copy)
+
+    def run(*words):
+        done = subprocess.run([command, *words, "--json"], capture_output=True, text=True)
+        return done.returncode, json.loads(done.stdout)
+
+    code, said = run("validate", copy)
+    assert code == 0 and said["problems"] == [] and said["frames"] == 2000
+    flip(copy / name, (copy / name).stat().st_size // 2)
+    assert run("info", copy)[0] == 0  # it reads no numbers
+    code, said = run("validate", copy)
+    path = copy / (name.rpartition("/")[0] if to in ("zarr", "ftp1") else name)
+    assert code == 3 and len(said["problems"]) == 1
+    assert said["error"].startswith(f"'{path}' is damaged: the checksum of its bytes is ")
+
+
+def test_an_export_of_an_older_version_has_no_sums(sets, command, tmp_path):
+    shutil.copytree(sets["zarr"], tmp_path / "out")
+    notes = tmp_path / "out/.zattrs"
+    said = json.loads(notes.read_text())
+    del said["stored"]
+    notes.write_text(json.dumps(said))
+    words = [command, "validate", tmp_path / "out"]
+    done = subprocess.run(words, capture_output=True, text=True)
+    assert done.returncode == 3 and "has no checksums of its files" in done.stderr
+    assert subprocess.run([command, "info", tmp_path / "out"], capture_output=True).returncode == 0
+
+
+def test_a_page_of_flipped_bytes_names_the_export(sets, tmp_path):
+    shutil.copytree(sets["lerobot"], tmp_path / "out")
+    path = tmp_path / "out" / PARQUET
+    end = path.stat().st_size
+    for at in range(end - 400, end - 10, 40):  # the footer, without which nothing can be read
+        flip(path, at)
+    with pytest.raises(tangere.IoError, match="out' is damaged"):
+        tangere.view(tmp_path / "out")
