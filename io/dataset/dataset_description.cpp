@@ -56,6 +56,7 @@ void describe_run(const h5::Id& scene, const DatasetLayout& layout) {
   h5::write_attribute(scene, "name", layout.scene_name);
   h5::write_attribute(scene, "dataset_id", layout.dataset_id());
   h5::write_attribute(scene, "text", layout.scene_text);
+  if (!layout.included.empty()) h5::write_attribute(scene, "included", layout.included);
   h5::write_attribute(scene, "tables", layout.tables);
   h5::write_attribute(scene, "controls", layout.controls);
   h5::write_attributes(scene, attributes_of(layout, layout.steps, layout.every));
@@ -148,6 +149,7 @@ void describe_numbers(const h5::Id& scene, const DatasetLayout& layout) {
   if (!layout.gained.empty()) texts("picture_gain_names", picture_gain_names(layout.gained));
   h5::write_attribute(scene, "observation_scale", observation_scale(layout));
   h5::write_attribute(scene, "privileged", privileged_observations(layout));
+  h5::write_attribute(scene, "actuated_joints", name_list(layout.actuated));
   h5::write_attribute(scene, "touch", touch_observations(layout));
   describe_task(scene, layout);
   if (!layout.task && !layout.end_effector_names.empty()) {

@@ -4,6 +4,9 @@
 
 #include <algorithm>
 
+#include "engine/scene/actuated_joints.hpp"
+#include "io/dataset/learner_notes.hpp"
+#include "io/scene/included_texts.hpp"
 #include "io/scene/scene_tables.hpp"
 
 namespace tangere {
@@ -32,7 +35,10 @@ DatasetLayout dataset_layout_from(const Model& model, const Stepper& stepper,
     layout.sensors.push_back(sensor_layout(model.sensors()[i], scene.sensors[i], requested.every));
   layout.cameras = camera_layouts(scene);
   layout.tables = tables_of(scene);
+  if (const IncludedTexts included = included_texts(scene.path, scene.text); !included.empty())
+    layout.included = json_of(included);
   layout.body_names.assign(model.body_names().begin(), model.body_names().end());
+  layout.actuated = actuated_joints(scene);
   for (const GainedPicture& picture : gained_pictures(model))
     if (is_recorded(layout, picture)) layout.gained.push_back(picture);
   return layout;

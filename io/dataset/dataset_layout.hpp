@@ -63,10 +63,12 @@ struct DatasetLayout : RunFacts {
   std::vector<CameraLayout> cameras;
   std::vector<GainedPicture> gained;      ///< whose gains are stored with an episode
   std::vector<std::string> body_names;    ///< of a scene
+  std::vector<std::string> actuated;      ///< joints that motors move (actuated_joints)
   PlayedBy played_by;                     ///< of a task
   std::string python_class;               ///< of a task written in Python: "MODULE:CLASS"
   std::string set_name;                   ///< the requested part of dataset_id(); none: as below
   std::string tables = "none";            ///< checksum of the files that the text refers to
+  std::string included;                   ///< texts of <include>, as JSON; empty: none
   std::string controls = "of the scene";  ///< or a table, named by its content
   double shard_bytes = 1 << 30;           ///< upper limit of a shard, unless 16 episodes are more
   std::int64_t shards = 0;                ///< number of shards; 0: as shard_bytes determines

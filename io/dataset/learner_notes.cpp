@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "engine/base/error.hpp"
+
 namespace tangere {
 namespace {
 
@@ -105,21 +107,41 @@ std::string observation_scale(const DatasetLayout& layout) {
 }
 
 std::string privileged_observations(const DatasetLayout& layout) {
-  std::vector<std::string> hidden = {"q", "v"};
+  std::vector<std::string> hidden = {"q", "v", "bodies"};
+  for (const std::string& body : layout.body_names) hidden.push_back("bodies." + body);
+  std::vector<std::string> shown;
   if (layout.task)
     for (const TensorSpec& tensor : layout.task->observations)
-      if (tensor.privileged) hidden.push_back(tensor.name);
-  Json names = Json::array();
+      (tensor.privileged ? hidden : shown).push_back(tensor.name);
+  const auto is_in = [](const std::vector<std::string>& names, const std::string& name) {
+    return std::find(names.begin(), names.end(), name) != names.end();
+  };
+  std::vector<std::string> names;
   for (const std::string& name : layout.observation_names())
-    if (std::find(hidden.begin(), hidden.end(), name) != hidden.end()) names.push_back(name);
-  return text_of(names);
+    if (is_in(hidden, name) && !is_in(shown, name)) names.push_back(name);
+  return name_list(names);
 }
+
+std::string name_list(const std::vector<std::string>& names) { return text_of(Json(names)); }
 
 std::string touch_observations(const DatasetLayout& layout) {
   const std::vector<std::string> stored = layout.observation_names();
-  Json names = Json::array();
+  std::vector<std::string> names;
   for (const std::size_t k : layout.touch()) names.push_back(stored[k]);
-  return text_of(names);
+  return name_list(names);
+}
+
+std::string json_of(const IncludedTexts& texts) { return text_of(Json(texts)); }
+
+IncludedTexts included_texts_in(const std::string& json) {
+  const Json found = Json::parse(json, nullptr, false);
+  IncludedTexts texts;
+  if (found.is_object())
+    for (const auto& [place, text] : found.items())
+      if (text.is_string()) texts[place] = text.get<std::string>();
+  if (!found.is_object() || texts.size() != found.size())
+    throw IoError("'included' of /scene is no JSON object of texts: the file is damaged");
+  return texts;
 }
 
 std::optional<std::vector<std::string>> names_in(const std::string& list) {

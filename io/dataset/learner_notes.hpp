@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "io/dataset/dataset_layout.hpp"
+#include "io/scene/included_texts.hpp"
 
 namespace tangere {
 
@@ -33,12 +34,19 @@ std::vector<std::string> readings_in(const std::string& environment);
 /// the observation's unit. Other observations have the scale 1.
 std::string observation_scale(const DatasetLayout& layout);
 
-/// [KEY, …] of the stored observations that a robot could not measure: q, v and what a task
-/// declares as privileged.
+/// [KEY, …] of the stored observations that a robot could not measure: q, v, motions of bodies, and
+/// what a task declares as privileged. Numbers of q and v of DatasetLayout::actuated are measured.
 std::string privileged_observations(const DatasetLayout& layout);
 
 /// [KEY, …] of the stored observations that are touch, DatasetLayout::touch().
 std::string touch_observations(const DatasetLayout& layout);
+
+/// Texts of included files as a JSON object, and from one. Throws IoError for another text.
+std::string json_of(const IncludedTexts& texts);
+IncludedTexts included_texts_in(const std::string& json);
+
+/// Writes names as such a list.
+std::string name_list(const std::vector<std::string>& names);
 
 /// Returns the names in such a list; nothing for another text.
 std::optional<std::vector<std::string>> names_in(const std::string& list);

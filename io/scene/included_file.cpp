@@ -100,8 +100,13 @@ const IncludedFile& include_file(const SceneNode& include, const SceneNode& pare
   context.file = path;
   context.allow_unknown = outer.allow_unknown;
   context.includer = &outer;
+  context.place = place_from(outer.place, include.text("file"));
   try {
-    const std::string text = read_text_file(path, kLargestInclude, "a scene file");
+    const IncludedTexts& known = outer.outermost().included_texts;
+    const auto stored = known.find(context.place);
+    const std::string text = stored != known.end()
+                                 ? stored->second
+                                 : read_text_file(path, kLargestInclude, "a scene file");
     file->root = &parse_xml(file->document, text, path, expected, outer.outermost().warnings);
   } catch (const IoError& e) {
     throw IoError(include.source().prefix() + "<include>: " + e.what());

@@ -4,15 +4,13 @@
 
 #include <tinyxml2.h>
 
-#include <cstddef>
 #include <memory>
 #include <string>
 
+#include "io/scene/included_texts.hpp"
 #include "io/scene/scene_node.hpp"
 
 namespace tangere {
-
-inline constexpr std::size_t kLargestInclude = std::size_t{64} << 20;  ///< [bytes]
 
 /// Whether two paths lead to one file, or would if it were there.
 bool same_file(const std::string& a, const std::string& b);

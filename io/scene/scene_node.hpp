@@ -17,6 +17,7 @@
 #include "engine/scene/scene.hpp"
 #include "engine/scene/units.hpp"
 #include "io/files/nearest_name.hpp"
+#include "io/scene/included_texts.hpp"
 
 namespace tangere {
 
@@ -43,6 +44,9 @@ struct SceneContext {
   std::vector<std::filesystem::path> folders = {};
   /// The file whose <include> names this one; nullptr for the file that the user names.
   SceneContext* includer = nullptr;
+  std::string place = {};  ///< of the file beside the user's, which has ""
+  /// Texts that take the place of included files, in the context of the user's file.
+  IncludedTexts included_texts = {};
   /// Files that <include> has brought in, in the context of the user's file. Elements refer to
   /// them.
   std::vector<std::shared_ptr<IncludedFile>> included = {};

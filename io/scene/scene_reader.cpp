@@ -282,6 +282,7 @@ SceneFile parse_scene(const std::string& text, const std::string& name,
   context.folders = options.folders;
   static const std::vector<std::filesystem::path> kShipped = shipped_scenes();
   context.folders.insert(context.folders.end(), kShipped.begin(), kShipped.end());
+  context.included_texts = options.included;
   const tinyxml2::XMLElement& root = parse_xml(document, text, name, kSceneRoots, context.warnings);
   SceneFile out;
   read_root(SceneNode(root, context), out.scene);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "engine/model/model.hpp"
+#include "io/scene/included_texts.hpp"
 
 namespace tangere {
 
@@ -20,6 +21,8 @@ struct SceneReadOptions {
   /// Where files of <include> are searched that are not beside the file that names them, before the
   /// scenes that come with the program (io/scene/scene_folders.hpp).
   std::vector<std::filesystem::path> folders{};
+  /// Of text that a data set stores: texts that take the place of files of <include>.
+  IncludedTexts included{};
 };
 
 struct SceneFile {

@@ -3,11 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <fstream>
+#include <iterator>
 #include <memory>
 
 #include "engine/base/error.hpp"
 #include "io/dataset/dataset_description.hpp"
 #include "io/dataset/dataset_files.hpp"
+#include "io/dataset/learner_notes.hpp"
 #include "io/files/jpeg_file.hpp"
 #include "io/view/view_pictures.hpp"
 #include "io/view/view_source.hpp"
@@ -23,6 +26,17 @@ struct Demo {
   std::int64_t number, rows;
 };
 
+/// The scene that a command "tangere generate SCENE --episodes …" names, if it has this text.
+std::string scene_of_command(const std::string& command, const std::string& text) {
+  constexpr std::string_view kBegin = "tangere generate ", kEnd = " --episodes ";
+  const std::size_t end = command.find(kEnd);
+  if (!command.starts_with(kBegin) || end == std::string::npos) return "";
+  std::string path = command.substr(kBegin.size(), end - kBegin.size());
+  std::ifstream file(path, std::ios::binary);
+  const std::string found{std::istreambuf_iterator<char>(file), {}};
+  return file && found == text ? path : "";
+}
+
 class DatasetView {
  public:
   DatasetView(const std::string& path, const ViewOptions& options)
@@ -37,8 +51,7 @@ class DatasetView {
       throw IoError(fmt::format("{}: /scene has no text: the file does not hold its scene",
                                 demos_.front().file));
     data_.title = h5::read_text(scene, "name"), data_.source = path_, data_.kind = "data set";
-    scene_ =
-        std::make_unique<ViewScene>(h5::read_text(scene, "text"), data_.title, path_, options_);
+    scene_ = stored_scene(file, scene);
     data_.scene = scene_->scene();
     q_names_ = h5::read_texts(scene, "q_names");
     scene_->check_names(q_names_);
@@ -60,6 +73,20 @@ class DatasetView {
   }
 
  private:
+  /// With the texts of <include> that it stores. Meshes and tables are beside the scene's file, if
+  /// that is still where the command of the data set names it.
+  [[nodiscard]] std::unique_ptr<ViewScene> stored_scene(const h5::Id& file, const h5::Id& scene) {
+    const std::string text = h5::read_text(scene, "text");
+    IncludedTexts included;
+    if (H5Aexists(scene.get(), "included") > 0)
+      included = included_texts_in(h5::read_text(scene, "included"));
+    const std::string command =
+        H5Aexists(file.get(), "command") > 0 ? h5::read_text(file, "command") : "";
+    const std::string path = scene_of_command(command, text);
+    return std::make_unique<ViewScene>(text, path.empty() ? data_.title : path, path_, options_,
+                                       included);
+  }
+
   void choose_demos() {
     std::size_t all = 0;
     for (const std::string& path : dataset_.files) {

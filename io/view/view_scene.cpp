@@ -103,10 +103,12 @@ struct ViewScene::Posed {
 };
 
 ViewScene::ViewScene(const std::string& text, const std::string& name, const std::string& path,
-                     const ViewOptions& options)
+                     const ViewOptions& options, const IncludedTexts& included)
     : path_(path) {
   try {
-    scene_ = parse_scene(text, options.scene.empty() ? name : options.scene).scene;
+    SceneReadOptions as_stored;
+    as_stored.included = included;
+    scene_ = parse_scene(text, options.scene.empty() ? name : options.scene, as_stored).scene;
     scene_.randomizations.clear();  // every episode stores its drawn values
     scene_.initial.clear();         // and where it was
     plain_ = std::make_unique<Posed>(scene_);

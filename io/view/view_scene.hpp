@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "io/scene/included_texts.hpp"
 #include "io/view/view_data.hpp"
 
 namespace tangere {
@@ -20,10 +21,10 @@ struct ViewNumbers {
 /// Compiles scenes with the sizes and places of an episode, and computes what moves.
 class ViewScene {
  public:
-  /// `path`: of the file, for messages. Throws IoError where the text is no scene or a file that it
-  /// names is not there.
+  /// `path`: of the file, for messages. `included`: texts that the file holds with the scene.
+  /// Throws IoError where the text is no scene or a file that it names is not there.
   ViewScene(const std::string& text, const std::string& name, const std::string& path,
-            const ViewOptions& options);
+            const ViewOptions& options, const IncludedTexts& included = {});
   ~ViewScene();
   ViewScene(const ViewScene&) = delete;
   ViewScene& operator=(const ViewScene&) = delete;

@@ -273,7 +273,7 @@ def names_of(episodes: Episodes, key: str, places: Sequence[int]) -> list[str]:
 
 
 def hidden_in_words(frames: Frames, written: Collection[str] = ()) -> str:
-    """What a robot does not measure, without observations that are written: "q of rod; v of rod"."""
+    """What a robot does not measure, without what is written: "q of rod; v of rod"."""
     words = []
     for key, places in frames.split()[1].items():
         names = names_of(frames.episodes, key, places) if places else []

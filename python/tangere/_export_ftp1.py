@@ -83,11 +83,11 @@ class Ftp1(ZarrStore):
                 f"{episodes.path}: no reading of a sensor for FTP-1; its observations are "
                 f"{episodes.keys}"
             )
-        self._start, self._joints = f"{side}_tactile", joint_places(frames, joints)
+        self._start, self._joints = f"{side}_tactile", joint_places(frames, joints, "joints")
         if len(self._joints) > _ARM_JOINTS:
             raise _core.InputError(f"{len(self._joints)} joints; expected {_ARM_JOINTS} at most")
         self._hand_key, self._slots = f"{side}_hand_joints", hand_slots(hand)
-        self._hand = joint_places(frames, ",".join(self._slots))
+        self._hand = joint_places(frames, ",".join(self._slots), "hand")
         shape = (len(self._hand),)
         if self._hand:
             columns[self._hand_key] = Column(
@@ -188,7 +188,7 @@ def hand_slots(hand: str | None) -> dict[str, int]:
     return slots
 
 
-def joint_places(frames: Frames, joints: str | None) -> list[int]:
+def joint_places(frames: Frames, joints: str | None, option: str) -> list[int]:
     """The places of coordinates in q, by their names with commas between them."""
     if not joints:
         return []
@@ -196,7 +196,13 @@ def joint_places(frames: Frames, joints: str | None) -> list[int]:
     names = joints.split(",")
     unknown = [name for name in names if name not in known]
     if unknown:
-        raise _core.InputError(f"joints {unknown[0]!r}; expected names of q: {', '.join(known)}")
+        why = ", an observation" if unknown[0] in frames.shapes else ""
+        raise _core.InputError(
+            f"{option} {unknown[0]!r}{why}; expected names of q: {', '.join(known)}"
+        )
     if "q" not in frames.shapes:
-        raise _core.InputError(f"{frames.episodes.path}: joints of a data set that has no q")
+        raise _core.InputError(
+            f"{frames.episodes.path}: {option} of a data set without q; expected one made with "
+            "--record q"
+        )
     return [known.index(name) for name in names]

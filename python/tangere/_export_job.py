@@ -73,7 +73,7 @@ def identity(job: dict[str, Any]) -> str:
 
 @dataclass
 class Work:
-    """What processes do for an export: they check each file of the data set, and write each part."""
+    """What processes do for an export: they check files of the data set, and write parts."""
 
     format: Format
     sources: list[Path]  #: files of the data set

@@ -3,7 +3,7 @@
 
     hdf5/0.hdf5, hdf5/1.hdf5 …
         step                             (T)          int64, the number of the frame
-        embodiment/joint                 (T, joints)  float32 [rad, m]
+        embodiment/joint                 (T, joints)  float32 [rad, m], of joints with a motor
         observation/CAMERA/rgb           (T)          JPEG files, bytes of one length
         tactile/SENSOR/rgb, rgb_marker   (T)          JPEG files
         tactile/SENSOR/press_depth       (T, H, W)    float32 [mm], positive where pressed
@@ -12,6 +12,7 @@
         tactile/SENSOR/force             (T, …)       float32 [N], of Tangere; SENSOR is the
                                          name of an observation where a task observes touch
         action, reward                   (T, na), (T) float32, of Tangere
+        q                                (T, nq)      float32 [rad, m], of Tangere, if privileged
     metadata.json                        of the data set
 
 `depth` is the distance from a camera, which is not known here, so it is not written. UniVTAC's
@@ -65,8 +66,8 @@ class UniVtac:
             for key in episodes.keys
             if key.split(".")[-1] in ("rgb", "rgb_marker", "height")
         }
-        names = [str(name) for name in episodes.attributes["q_names"]]
-        self._joints = joint_places(frames, joints or ",".join(names))
+        self._joints = joint_places(frames, joints, "joints") if joints else _motors(frames)
+        self._all = privileged
         count = len(frames.lengths)
         self._cuts = [*range(0, count, _EPISODES), count]
         self.parts = [
@@ -160,6 +161,8 @@ class UniVtac:
             "action": arrays["actions"],
             "reward": arrays["rewards"],
         }
+        if self._all:
+            found["q"] = arrays["q"].astype(np.float32)
         for key in episodes.keys:
             owner, _, reading = key.partition(".")
             if is_picture(frames.shapes[key], frames.types[key]):
@@ -181,6 +184,20 @@ class UniVtac:
     def _newest(self, arrays: Arrays, key: str) -> np.ndarray:
         """The reading at each row."""
         return arrays[key][:, -1] if self.frames.has_window(key) else arrays[key]
+
+
+def _motors(frames: Frames) -> list[int]:
+    """Places in q of joints with a motor."""
+    episodes = frames.episodes
+    places = episodes.driven("q")
+    if not places or "q" not in frames.shapes:
+        names = ", ".join(str(name) for name in episodes.attributes["q_names"])
+        why = "no joint has a motor" if "q" in frames.shapes else "it has no q (--record q)"
+        raise _core.InputError(
+            f"{episodes.path}: UniVTAC needs joints of a robot, and {why}; expected joints "
+            f"(--joints) of {names}"
+        )
+    return places
 
 
 def marker_pixels(moved: np.ndarray, sensor: dict[str, Any], pixels: tuple[int, ...]) -> np.ndarray:

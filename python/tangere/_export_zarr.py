@@ -133,7 +133,7 @@ class ZarrStore:
 class Zarr(ZarrStore):
     """The format. Observations keep their names, shapes and types; beside them are "action",
     "reward", "done" and, of a task, "success". Of q and v of a scene "q" and "v" have the
-    coordinates of joints with a motor, if there are any, "q_privileged" and "v_privileged" the rest.
+    coordinates of joints with a motor, if there are any; "q_privileged", "v_privileged" the rest.
 
     privileged: observations that a robot could not measure come along.
     """
@@ -175,10 +175,9 @@ class Zarr(ZarrStore):
         return about | lists
 
     def arrays(self, frames: Arrays, start: int) -> Arrays:
-        return {
-            name: frames[source][:, self._numbers[name]] if name in self._numbers else frames[source]
-            for name, source in self._sources.items()
-        }
+        found = {name: frames[source] for name, source in self._sources.items()}
+        taken = {name: places for name, places in self._numbers.items() if name in found}
+        return found | {name: found[name][:, places] for name, places in taken.items()}
 
 
 def attributes_of(frames: Frames) -> dict[str, dict[str, Any]]:

@@ -100,7 +100,8 @@ def _columns(episodes: Episodes, features: Sequence[Feature]) -> list[str]:
                 what += f", pad {feature.pad}: 0, 128 and 255 are -range, 0 and range, ({ranges})"
             if key in feature.numbers:
                 moved = "with a motor" if feature.name == STATE else "without a motor"
-                what += f" of joints {moved}: {', '.join(names_of(episodes, key, feature.numbers[key]))}"
+                names = names_of(episodes, key, feature.numbers[key])
+                what += f" of joints {moved}: {', '.join(names)}"
             unit, meaning = unit_and_meaning(episodes, key)
             what += f" [{unit}]" if unit else ""
             lines.append(f"  - {what}" + (f": {meaning}" if meaning else ""))

@@ -189,6 +189,10 @@ def features_of(
         if privileged or key not in episodes.privileged
     ]
     action = [str(name) for name in episodes.attributes["action_names"]]
+    if not action:
+        raise _core.InputError(
+            f"{episodes.path}: its scene has no motor, so no action; expected an action for LeRobot"
+        )
     features.append(Feature("action", ["actions"], (len(action),), names=action))
     features.append(Feature("next.reward", ["rewards"], (1,)))
     features.append(Feature("next.done", ["dones"], (1,), "bool"))

@@ -27,6 +27,7 @@ from ._generate import run_command
 Arrays = dict[str, np.ndarray]
 
 class _Export(NamedTuple):
+    command: str  # of the data set
     note: dict[str, Any]  # what the exporter has left for pages
     seconds: float  # of a frame
     lengths: list[int]
@@ -51,7 +52,7 @@ def page(
     chosen = range(min(episodes, count)) if episode is None else [episode]
     with tempfile.TemporaryDirectory() as folder:
         data, out = Path(folder) / "export.h5", Path(folder) / "page.html"
-        moved = _write(data, export, chosen)
+        moved = _write(data, path, export, chosen)
         words = ["view", str(data), "-o", str(out), "--frames", str(frames)]
         words += ["--episodes", str(len(chosen)), *(["--scene", scene] if scene else [])]
         said = run_command(words)
@@ -124,16 +125,27 @@ def _zarr(path: Path, said: dict[str, Any]) -> _Export:
             elif "window" in array.attrs:
                 rows = rows[:, -1]
             found["rewards" if name == "reward" else key] = rows
+        whole = [
+            (arrays[key].attrs["names"], found.pop(key))
+            for key in ("q", "q_privileged")
+            if key in found
+        ]
+        found |= _coordinates(whole, said["scene"]["q_names"])
         return found
 
-    return _Export(said["scene"], float(said["seconds_per_frame"]), np.diff(starts).tolist(), read)
+    return _Export(
+        said["command"], said["scene"], float(said["seconds_per_frame"]), np.diff(starts).tolist(),
+        read,
+    )  # fmt: skip
 
 
 def _univtac(path: Path, said: dict[str, Any]) -> _Export:
     def read(episode: int) -> Arrays:
         found: Arrays = {}
         with h5py.File(path / f"hdf5/{episode}.hdf5") as file:
-            if said["joints"] == said["scene"]["q_names"]:
+            if "q" in file:
+                found["q"] = file["q"][()]
+            elif said["joints"] == said["scene"]["q_names"]:
                 found["q"] = file["embodiment/joint"][()]
             found["rewards"] = file["reward"][()]
             for key in said["scene"]["sensors"]:
@@ -147,7 +159,7 @@ def _univtac(path: Path, said: dict[str, Any]) -> _Export:
         return found
 
     lengths = [int(episode["steps"]) for episode in said["episodes"]]
-    return _Export(said["scene"], float(said["seconds_per_frame"]), lengths, read)
+    return _Export(said["command"], said["scene"], float(said["seconds_per_frame"]), lengths, read)
 
 
 def _lerobot(path: Path, said: dict[str, Any]) -> _Export:
@@ -165,27 +177,37 @@ def _lerobot(path: Path, said: dict[str, Any]) -> _Export:
             for name in names
             if name.removeprefix("observation.") in said["scene"]["sensors"]
         }
-        joined = [c for c in said["columns"] if {*place} <= {*(c.get("names") or ())}]
+        vectors = [c for c in said["columns"] if {*place} & {*(c.get("names") or ())}]
         pictures = [name for name in names if name.startswith(images)]
-        columns = [*wanted, *(c["name"] for c in joined[:1]), *pictures, "next.reward"]
+        columns = [*wanted, *(c["name"] for c in vectors), *pictures, "next.reward"]
         rows = table.to_table(columns=columns, filter=files.field("episode_index") == episode)
         found = {"rewards": _numbers(rows["next.reward"], ())}
         for name, key in wanted.items():
             array = _numbers(rows[name], features[name]["shape"])
             found[key] = array[:, -1] if key in said.get("windows", {}) else array
-        for column in joined[:1]:
-            at = [column["names"].index(name) for name in place]
-            found["q"] = _numbers(rows[column["name"]], column["shape"])[:, at]
+        whole = [(c["names"], _numbers(rows[c["name"]], c["shape"])) for c in vectors]
+        found |= _coordinates(whole, place)
         for name in pictures:
             found[name.removeprefix(images)] = _unpacked(rows[name].to_pylist())
         return found
 
+    lengths = np.bincount(index).tolist()
     return _Export(
-        said["scene"], float(said["seconds_per_action"]), np.bincount(index).tolist(), read
-    )
+        said["command"], said["scene"], float(said["seconds_per_action"]), lengths, read
+    )  # fmt: skip
 
 
 _ORIGINS = {"meta/tangere.json": _lerobot, ".zattrs": _zarr, "metadata.json": _univtac}
+
+
+def _coordinates(
+    parts: Sequence[tuple[Sequence[str], np.ndarray]], q_names: Sequence[str]
+) -> Arrays:
+    """q, if its numbers are in arrays (frames, names)."""
+    known = {name: rows[:, k] for names, rows in parts for k, name in enumerate(names)}
+    if not {*q_names} <= {*known}:
+        return {}
+    return {"q": np.stack([known[name] for name in q_names], axis=1)}
 
 
 def _numbers(column: Any, shape: Sequence[int]) -> np.ndarray:
@@ -205,10 +227,23 @@ def _unpacked(files: Iterable[dict[str, bytes]]) -> np.ndarray:
 
 
 def _is_wanted(key: str, note: dict[str, Any]) -> bool:
-    return key == "q" or key in note["sensors"] or key.endswith((".rgb", ".rgb_marker"))
+    known = {"q", "q_privileged", *note["sensors"]}
+    return key in known or key.endswith((".rgb", ".rgb_marker"))
 
 
-def _write(data: Path, export: _Export, chosen: Sequence[int]) -> bool:
+def _read(path: Path, export: _Export, episode: int) -> Arrays:
+    try:
+        return export.read(episode)
+    except (ModuleNotFoundError, _core.IoError):
+        raise
+    except Exception as error:  # whatever the library of the format raises for damaged bytes
+        raise _core.IoError(
+            f"'{path}' is damaged: episode {episode} cannot be read: {error}; `tangere validate` "
+            "names the file"
+        ) from error
+
+
+def _write(data: Path, path: Path, export: _Export, chosen: Sequence[int]) -> bool:
     """Writes the data set. Returns whether the bodies move."""
     note, sensors, moved = export.note, export.note["sensors"], False
     with h5py.File(data, "w") as file:
@@ -218,16 +253,18 @@ def _write(data: Path, export: _Export, chosen: Sequence[int]) -> bool:
             "name": note["name"], "text": note["text"], "q_names": note["q_names"],
             "timestep": export.seconds, "every": 1, "steps": longest, "policy": "of the export",
         })  # fmt: skip
+        if "included" in note:
+            scene.attrs["included"] = note["included"]
         file.attrs.update({
             "format": "tangere dataset", "format_version": 6, "dataset_episodes": len(chosen),
-            "dataset_shards": 1,
+            "dataset_shards": 1, "command": export.command,
         })  # fmt: skip
         file.create_group("failed")
         if note.get("randomized_names"):
             scene.attrs["randomized_names"] = note["randomized_names"]
         stored: list[str] = []
         for k in chosen:
-            arrays = export.read(k)
+            arrays = _read(path, export, k)
             rewards = arrays.pop("rewards")
             moved = moved or "q" in arrays
             arrays.setdefault("q", np.tile(np.float64(note["q_start"]), (len(rewards), 1)))
@@ -289,10 +326,11 @@ def main(arguments: Sequence[str] | None = None, prog: str = "tangere view") -> 
     if given.json:
         print(json.dumps(said | {"output": str(out)}))
         return 0
-    if not given.quiet:
-        size = said["bytes"] / 1e6
-        print(f"wrote {out} ({size:.1f} MB): {said['episodes']} episodes, {said['frames']} frames; "
-              "open it in a browser")  # fmt: skip
+    if given.quiet:
+        return 0
+    size = said["bytes"] / 1e6
+    print(f"wrote {out} ({size:.1f} MB): {said['episodes']} episodes, {said['frames']} frames; "
+          "open it in a browser")  # fmt: skip
     for note in said["notes"]:
         print(f"note: {note}", file=sys.stderr)
     return 0

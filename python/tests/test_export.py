@@ -186,7 +186,8 @@ def test_videos_follow_one_another(generate, tmp_path):
 def test_a_window_has_the_touch_between_frames(balls, tmp_path):
     exports.export(balls, tmp_path / "zarr", "zarr", window=20, privileged=True)
     root = zarr.open_group(str(tmp_path / "zarr"), mode="r")
-    window, q = root["data/pad"][:], root["data/q"][:]
+    window = root["data/pad"][:]
+    q = np.hstack([root["data/q"][:], root["data/q_privileged"][:]])  # of the pad, of the ball
     np.testing.assert_array_equal(root["meta/episode_ends"][:], [8, 16])  # of 146 rows each
     with h5py.File(balls / "shard-00000.h5") as file:
         for episode in (0, 1):
@@ -307,19 +308,19 @@ def test_processes_do_not_mix_two_exports(pushes, tmp_path, monkeypatch):
     from tangere.data import Episodes
 
     format = Zarr(Frames(Episodes(pushes), range(20)))
-    with _export_job.Folder(tmp_path / "out", format, "of another", overwrite=False).shared():
+    other = _export_job.Folder(tmp_path / "out", format, "of another", False, [])
+    with other.shared():
         with pytest.raises(tangere.InputError, match="by another process, with other options"):
             exports.export(pushes, tmp_path / "out", "zarr")
 
 
-def test_a_process_that_fails_tells_why(pushes, tmp_path, monkeypatch):
+def test_a_process_that_fails_tells_why(pushes, spoil, tmp_path, monkeypatch):
     import shutil
 
     many_parts(monkeypatch)
     copy = tmp_path / "damaged"
     shutil.copytree(pushes, copy)
-    with h5py.File(copy / "shard-00000.h5", "r+") as file:
-        file["data/demo_7/obs/tactile"][3, 2, 1, 0] = np.nan
+    spoil(copy)
     with pytest.raises(tangere.InputError, match="demo_7 has a number in 'tactile' that is not"):
         exports.export(copy, tmp_path / "out", "zarr", workers=2)
     assert [path.name for path in tmp_path.iterdir()] == ["damaged"]
@@ -349,7 +350,8 @@ def test_what_a_format_does_not_have_is_told(pushes, generate, tmp_path):
         (pushes, "zarr", {"fps": 3}, "zarr has no option 'fps'; it has privileged"),
         (pushes, "csv", {"mask": "train"}, "csv has no option 'mask'"),
         (pushes, "ftp1", {"joints": "elbow"}, "joints 'elbow'; expected names of q: hand_turn"),
-        (pushes, "ftp1", {"hand": "elbow"}, "joints 'elbow'; expected names of q: hand_turn"),
+        (pushes, "ftp1", {"hand": "elbow"}, "hand 'elbow'; expected names of q: hand_turn"),
+        (pushes, "ftp1", {"hand": "goal=3"}, "hand 'goal', an observation; expected names of q"),
         (pushes, "ftp1", {"hand": "hand_turn=32"}, "hand 'hand_turn=32'; expected NAME=NUMBER"),
         (pushes, "ftp1", {"hand": "hand_turn=1,box.x"}, "hand 'box.x'; expected NAME=NUMBER"),
         (pushes, "ftp1", {"side": "top"}, "side 'top'; expected left or right"),
@@ -380,6 +382,35 @@ def test_csv_is_that_of_the_command(pushes, command, tmp_path):
     subprocess.run(words, check=True, capture_output=True)
     assert filecmp.cmp(tmp_path / "python.csv", tmp_path / "command.csv", shallow=False)
     assert done.frames == 2000 and done.complete
+
+
+def test_a_table_names_the_readings_of_a_window(generate, command, tmp_path):
+    data = generate(str(tangere.scenes()["rolling_ball_small"]), "--episodes", "1", "--steps", "60",
+                    "--every", "20", "--record", "q,pad.sum/5")  # fmt: skip
+    exports.export(data, tmp_path / "out.csv", "csv")
+    title, names, *lines = (tmp_path / "out.csv").read_text().splitlines()
+    assert title.endswith(", seed 0, 1 episodes, 3 rows") and len(lines) == 3
+    columns = dict(zip(names.split(","), np.array([line.split(",") for line in lines], float).T))
+    window = stored(data, "obs/pad.sum")  # (rows, 4 readings, 6)
+    assert window.shape == (3, 4, 6)
+    for reading in range(4):
+        for k in range(6):
+            found = columns[f"pad.sum[{reading - 3}]/{k}"]
+            np.testing.assert_allclose(found, window[:, reading, k], rtol=1e-6)
+    assert "q/pad_joint.x" in columns and not any("[-4]" in name for name in columns)
+
+
+def test_quiet_prints_errors_alone(pushes, command, tmp_path):
+    environment = os.environ | {"TANGERE_PYTHON": sys.executable}
+    for words in (
+        ["export", pushes, tmp_path / "out", "--to", "lerobot"],
+        ["export", pushes, tmp_path / "out.csv", "--to", "csv"],
+        ["info", tmp_path / "out"],
+        ["validate", tmp_path / "out"],
+        ["view", tmp_path / "out", "-o", tmp_path / "page.html"],
+    ):
+        run = subprocess.run([command, *words, "--quiet"], env=environment, capture_output=True)
+        assert (run.returncode, run.stdout, run.stderr) == (0, b"", b""), words
 
 
 def test_the_command_is_the_same_code(pushes, command, tmp_path):

@@ -32,6 +32,16 @@ def touched(generate, tmp_path_factory):
                     "4", "--record", "q,pad/10,eye.rgb")  # fmt: skip
 
 
+OCTAHEDRON = """v 0.02 0 0
+v -0.02 0 0
+v 0 0.02 0
+v 0 -0.02 0
+v 0 0 0.02
+v 0 0 -0.02
+""" + "".join(f"f {a} {b} {c}\n" for a, b, c in (
+    (1, 3, 5), (3, 2, 5), (2, 4, 5), (4, 1, 5), (3, 1, 6), (2, 3, 6), (4, 2, 6), (1, 4, 6)))
+
+
 def block(text):
     found = re.search(r'<script type="application/json"[^>]*>(.*?)</script>', text, re.DOTALL)
     assert found, text[:300]
@@ -48,7 +58,7 @@ def rows_of(array, count):
 
 @pytest.mark.parametrize("to", ["lerobot", "zarr", "ftp1", "univtac"])
 def test_every_format_becomes_the_page_of_its_data_set(touched, tmp_path, to):
-    options = {"privileged": True} if to in ("lerobot", "zarr") else {}
+    options = {"privileged": True} if to != "ftp1" else {}
     exports.export(touched, tmp_path / "out", to, **options)
     wanted, shown = (block(tangere.view(path).html) for path in (touched, tmp_path / "out"))
     assert shown["source"] == str(tmp_path / "out") and shown["shapes"] == wanted["shapes"]
@@ -69,6 +79,41 @@ def test_every_format_becomes_the_page_of_its_data_set(touched, tmp_path, to):
             assert len(other["pictures"][0]["jpeg"]) == 7  # the last frame comes twice
             if to != "univtac":
                 assert other["pictures"][0]["jpeg"][:6] == one["pictures"][0]["jpeg"][:6]
+
+
+def test_scenes_with_other_files_need_no_scene(generate, command, tmp_path):
+    """Of <include> the data set has the texts; meshes lie beside the scene of the command."""
+    text = tangere.scenes()["rolling_ball_small"].read_text()
+    start, end = text.index("<sensor>"), text.index("</sensor>") + len("</sensor>")
+    sensors = text[start:end]
+    folder = tmp_path / "scene"
+    folder.mkdir()
+    (folder / "sensors.xml").write_text(f"<tangere><option unit='m-kg'/>{sensors}</tangere>")
+    parts = text[:start] + '<include file="sensors.xml"/>' + text[end:]
+    (folder / "scene.xml").write_text(parts)
+    data = generate(str(folder / "scene.xml"), "--episodes", "1", "--steps", "20", "--every", "10",
+                    "--record", "q,pad")  # fmt: skip
+    exports.export(data, tmp_path / "out", "zarr", privileged=True)
+    shown = block(tangere.view(data).html)["sensors"]
+    folder.rename(tmp_path / "gone")
+    for path in (data, tmp_path / "out"):
+        assert block(tangere.view(path).html)["sensors"] == shown
+
+    (tmp_path / "gone/ball.obj").write_text(OCTAHEDRON)
+    body = text.index("<body", text.index('"ball"'))
+    mesh = '<body name="ball" type="mesh" filename="ball.obj" transform_type="OBJ_TO_JOINT" '
+    mesh += 'pos="0 0 0" quat="1 0 0 0" density="1000"/>'
+    own = text[:body] + mesh + text[text.index("/>", body) + 2 :]
+    for tag in ("contact", "randomize"):
+        own = own[: own.index(f"<{tag}>")] + own[own.index(f"</{tag}>") + len(f"</{tag}>") :]
+    (tmp_path / "gone/own.xml").write_text(own)
+    data = generate(str(tmp_path / "gone/own.xml"), "--episodes", "1", "--steps", "20", "--every",
+                    "10", "--record", "q")  # fmt: skip
+    assert any("triangles" in body or "mesh" in str(body)
+               for body in block(tangere.view(data).html)["shapes"][0])  # fmt: skip
+    (tmp_path / "gone").rename(tmp_path / "away")
+    with pytest.raises(tangere.IoError, match="ball.obj.*--scene FILE says beside which file"):
+        tangere.view(data)
 
 
 def test_rewards_and_other_lengths_are_shown(generate, tmp_path):

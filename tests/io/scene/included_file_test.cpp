@@ -5,6 +5,8 @@
 #include <filesystem>
 #include <fstream>
 
+#include "engine/base/error.hpp"
+#include "io/dataset/learner_notes.hpp"
 #include "io/scene/scene_reader.hpp"
 #include "tests/io/synthetic_run.hpp"
 
@@ -36,6 +38,33 @@ TEST(SceneInclude, FilesKeepTheirUnitsAndDefaults) {
   ASSERT_EQ(tip.points.size(), 302U);
   EXPECT_LT(tip.points[0].normal[2], -0.9);  // half a turn about x
   EXPECT_THAT(file.warnings, ElementsAre(HasSubstr("reads forces that nothing exerts")));
+}
+
+/// The scene of a data set that has moved: its text and those of its files.
+TEST(SceneInclude, TextsTakeThePlaceOfFiles) {
+  const testing::Folder folder;
+  const std::string scene =
+      "<tangere><option unit=\"m-kg\" timestep=\"5e-3\"/><include "
+      "file=\"parts/all.xml\"/></tangere>";
+  std::filesystem::create_directories(folder / "parts/deep");
+  std::ofstream(folder / "scene.xml") << scene;
+  std::ofstream(folder / "parts/all.xml")
+      << "<tangere><option unit=\"m-kg\"/><include file=\"deep/../b.xml\"/></tangere>";
+  std::ofstream(folder / "parts/b.xml")
+      << "<tangere><option unit=\"m-kg\"/><robot><link name=\"b\"><joint name=\"b\" "
+         "type=\"prismatic\" axis=\"0 0 1\"/><body name=\"b\" type=\"sphere\" radius=\"1\" "
+         "density=\"1\"/></link></robot></tangere>";
+  const std::string path = folder / "scene.xml";
+  const IncludedTexts texts = included_texts(path, scene);
+  ASSERT_EQ(texts.size(), 2U);
+  EXPECT_TRUE(texts.contains("parts/all.xml") && texts.contains("parts/b.xml"));
+  EXPECT_EQ(included_texts_in(json_of(texts)), texts);
+  EXPECT_THROW(included_texts_in("[1]"), IoError);
+  EXPECT_THROW(parse_scene(scene, "scene"), IoError);
+  SceneReadOptions stored;
+  stored.included = texts;
+  EXPECT_EQ(parse_scene(scene, "scene", stored).scene.links.at(0).name, "b");
+  EXPECT_TRUE(included_texts("", scene).empty());  // of text in memory nothing is known
 }
 
 /// Files of one folder; the first is read.
