@@ -38,16 +38,18 @@ def missing(name, package):
     text = f"{what} needs the Python package {name}, which {sys.executable} does not have; "
     text += f"expected it from `{sys.executable} -m pip install {package}`, "
     text += "or another TANGERE_PYTHON"
+    if name == "tangere":
+        text += ". '.[data]' is the folder of Tangere's sources"
     if "--json" in words:
         print(json.dumps({"command": command, "exit_code": 3, "error": text}))
     print(f"tangere {command}: {text}", file=sys.stderr)
     sys.exit(3)
 if importlib.util.find_spec("tangere") is None:
-    missing("tangere", "'tangere[data]'")
+    missing("tangere", "'.[data]'")
 try:
     main = importlib.import_module(module).main
 except ModuleNotFoundError as error:
-    missing(error.name, "'tangere[data]'")
+    missing(error.name, {"PIL": "pillow"}.get(error.name, error.name))
 sys.exit(main(words, prog=f"tangere {command}"))
 )";
 

@@ -6,7 +6,7 @@
     algorithm.fit(buffer, n_steps=10000)
     tangere.d3rlpy.play(algorithm, "box_pushing")
 
-Needs d3rlpy and `tangere[data]`. An observation is one vector: that of `tangere.make_vec(task,
+Needs d3rlpy and h5py. An observation is one vector: that of `tangere.make_vec(task,
 flatten=True)`, divided by the scales of the task.
 """
 

@@ -66,8 +66,8 @@ class Episodes:
                     expected = 1 if one else int(file.attrs["dataset_shards"])
                     if expected != len(self.files):
                         raise _core.InputError(
-                            f"{self.path} has {len(self.files)} shards of {expected}; expected all, "
-                            "see `tangere generate --resume`"
+                            f"{self.path} has {len(self.files)} shards of {expected}; expected "
+                            "all, see `tangere generate --resume`"
                         )
                     self.attributes = dict(file["scene"].attrs)
                     self.command = str(file.attrs["command"])

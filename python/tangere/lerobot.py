@@ -3,7 +3,7 @@
 
     tangere export out/pushes out/pushes_lerobot --to lerobot
 
-Needs h5py and pyarrow (`pip install tangere[data]`). A frame is a row of the data set: what was
+Needs h5py and pyarrow (`pip install h5py pyarrow`). A frame is a row of the data set: what was
 observed, the action that followed, its reward, and whether the episode ended with it in success.
 Numbers are those of the files, in SI units and as float32. The same data set gives the same bytes
 with one release of pyarrow.

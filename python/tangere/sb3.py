@@ -7,8 +7,8 @@
     env = VecMonitor(tangere.sb3.VecEnv("box_pushing", 64, seed=1))
     PPO("MultiInputPolicy", env).learn(1_000_000)
 
-Needs Stable-Baselines3 (`pip install tangere[sb3]`). All environments are stepped by one call in
-C++, so there is nothing to gain from its SubprocVecEnv.
+Needs Stable-Baselines3 (`pip install stable-baselines3`). All environments are stepped by one
+call in C++, so there is nothing to gain from its SubprocVecEnv.
 """
 
 from __future__ import annotations
