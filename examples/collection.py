@@ -36,7 +36,6 @@ class Part:
     options: tuple[str, ...] = ()
 
 
-LEAST = 16  # episodes of a part
 WIDER = ("--noise", "0.1", "--mix", "random=0.2")  # what a script alone would not show
 PARTS = (
     Part("ball_rolling", "ball_rolling_small", 8, ("--policy", "random")),
@@ -131,13 +130,25 @@ def write_scenes(folder: Path) -> None:
             part.rename(path)
 
 
+def shared(episodes: int) -> list[int]:
+    """Episodes of each part, one or more: as its share says, and `episodes` together. There are at
+    least as many as parts."""
+    exact = [episodes * part.share / 100 for part in PARTS]
+    counts = [max(1, int(share)) for share in exact]
+    while sum(counts) != episodes:
+        step = 1 if sum(counts) < episodes else -1
+        free = [k for k, count in enumerate(counts) if count + step >= 1]
+        k = max(free, key=lambda k: step * (exact[k] - counts[k]))
+        counts[k] += step
+    return counts
+
+
 def make(folder: Path, episodes: int, seed: int) -> None:
     """Makes what is missing of all parts."""
     folder.mkdir(parents=True, exist_ok=True)
     write_scenes(folder)
-    for part in PARTS:
+    for part, count in zip(PARTS, shared(episodes), strict=True):
         what = str(folder / part.what) if part.what.endswith(".xml") else part.what
-        count = max(LEAST, episodes * part.share // 100)
         start = time.monotonic()
         done = run_command([
             "generate", what, "--output", str(folder / part.name), "--episodes", str(count),
@@ -184,11 +195,13 @@ def card(folder: Path, license: str) -> str:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("output", type=Path)
-    parser.add_argument("--episodes", type=int, default=10000, help="of all parts, about")
+    parser.add_argument("--episodes", type=int, default=10000, help="of all parts together")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--license", default="CC0-1.0", help="of the data, as the card names it")
     parser.add_argument("--to", choices=["lerobot", "zarr"], help="also export each part")
     args = parser.parse_args()
+    if args.episodes < len(PARTS):
+        parser.error(f"--episodes {args.episodes}; expected {len(PARTS)} or more, one of each part")
     make(args.output, args.episodes, args.seed)
     merged = [(args.output / part.name / "robomimic.hdf5").is_file() for part in PARTS]
     if not all(merged):

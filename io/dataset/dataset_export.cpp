@@ -118,13 +118,29 @@ class CsvExport {
       if (name == "q" || name == "v") {
         add_names(name + "/", h5::read_texts(scene, name + "_names"));
       } else {
-        for (std::size_t k = 0; k < width; ++k) line += fmt::format(",{}/{}", name, k);
+        add_columns(line, name, width, scene);
       }
     }
     for (const StoredSample& sample : stored_samples(scene, 1, 1))
       result_.left_out.push_back(sample.name);
     result_.columns = std::count(line.begin(), line.end(), ',') + 1;
     part_.write(line + "\n");
+  }
+
+  /// "sum/0", "sum/1" …; of a window "sum[-2]/0" … "sum[0]/0": which reading before the newest.
+  static void add_columns(std::string& line, const std::string& name, std::size_t width,
+                          const h5::Id& scene) {
+    std::size_t readings = 1;
+    for (const StoredWindow& window :
+         stored_windows(scene, h5::read_number<std::int64_t>(scene, "every")))
+      if (window.name == name) readings = static_cast<std::size_t>(window.readings);
+    const std::size_t each = width / readings;
+    for (std::size_t k = 0; k < width; ++k)
+      line += readings == 1 ? fmt::format(",{}/{}", name, k)
+                            : fmt::format(",{}[{}]/{}", name,
+                                          static_cast<std::int64_t>(k / each) -
+                                              static_cast<std::int64_t>(readings) + 1,
+                                          k % each);
   }
 
   void add(const h5::Id& demo, const h5::Id& scene, std::int64_t number) {

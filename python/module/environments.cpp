@@ -28,9 +28,14 @@ std::vector<TimedName> readings_named(const std::vector<std::string>& words, con
   const std::vector<std::string> sensors = sensor_names(task.model().scene());
   for (const std::string& word : words) {
     const TimedName& reading = readings.emplace_back(split_times(word));
-    if (!find_output(sensors, reading.name))
-      throw InputError(fmt::format("readings: no sensor has '{}'{}", reading.name,
-                                   suggestion(reading.name, output_names(sensors))));
+    if (find_output(sensors, reading.name)) continue;
+    const bool is_state = reading.name == "q" || reading.name == "v";
+    throw InputError(fmt::format(
+        "readings: no sensor has '{}'{}", reading.name,
+        is_state ? fmt::format("; expected readings of the sensors {}, such as '{}.sum'. q and v "
+                               "are those of state()",
+                               fmt::join(sensors, ", "), sensors.empty() ? "pad" : sensors.front())
+                 : suggestion(reading.name, output_names(sensors))));
   }
   return readings;
 }

@@ -92,9 +92,9 @@ def export(
     options: of the format: those that `tangere.lerobot.export` and docs/datasets.md name.
 
     Every file of the data set is read and compared with its checksum. Raises InputError for a data
-    set without episodes and for options that do not fit it, IoError or OSError if a file is damaged,
-    if reading or writing fails or a library is missing. Nothing is left under the name `output`
-    then.
+    set without episodes and for options that do not fit it, IoError or OSError if a file is
+    damaged, if reading or writing fails or a library is missing. Nothing is left under the name
+    `output` then.
     """
     if to not in get_args(To):
         raise _core.InputError(f"to {to!r}; expected one of {', '.join(get_args(To))}")
@@ -228,7 +228,7 @@ def _parser(prog: str) -> argparse.ArgumentParser:
     parser.add_argument("--workers", type=int, metavar="N", help="processes [default: one a core]")
     parser.add_argument("--resume", action="store_true", help="go on with a run that was stopped")
     parser.add_argument("--overwrite", action="store_true", help="replace a data set of this name")
-    parser.add_argument("--quiet", action="store_true", help="no progress")
+    parser.add_argument("--quiet", action="store_true", help="print errors only")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     return parser
 
@@ -295,13 +295,14 @@ def main(arguments: Sequence[str] | None = None, prog: str = "python -m tangere.
         signal.signal(signal.SIGTERM, before)
         if line:
             line.close()
-    _report(done, as_json)
+    _report(done, as_json, quiet)
     return 0
 
 
-def _report(done: Exported, as_json: bool) -> None:
+def _report(done: Exported, as_json: bool, quiet: bool) -> None:
     if as_json:
         print(json.dumps({"command": "export", "exit_code": 0} | asdict(done)))
+    if as_json or quiet:
         return
     if not done.complete:
         print(f"wrote parts of {done.output}; other processes write the rest")

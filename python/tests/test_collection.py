@@ -23,7 +23,6 @@ def collection():
     module = importlib.util.module_from_spec(spec)
     sys.modules["collection"] = module  # which its dataclass needs
     spec.loader.exec_module(module)
-    module.LEAST = 1
     fewer = {"200": "80", "300": "100"}  # steps
     for part in module.PARTS:
         part.options = tuple(fewer.get(word, word) for word in part.options)
@@ -32,7 +31,7 @@ def collection():
 
 def test_all_parts_are_made_and_named_by_the_card(collection, command, tmp_path, monkeypatch):
     monkeypatch.setenv("TANGERE_PROGRAM", str(command))
-    monkeypatch.setattr(sys, "argv", ["collection.py", str(tmp_path), "--episodes", "1"])
+    monkeypatch.setattr(sys, "argv", ["collection.py", str(tmp_path), "--episodes", "11"])
     assert collection.main() == 0
     card = (tmp_path / "README.md").read_text()
     for part in collection.PARTS:
@@ -57,6 +56,22 @@ def test_all_parts_are_made_and_named_by_the_card(collection, command, tmp_path,
     assert collection.main() == 0  # nothing is left to do
     assert (tmp_path / "box_pushing/shard-00000.h5").stat().st_mtime_ns == before
     assert re.findall("Licence: (.*?)[.] ", (tmp_path / "README.md").read_text()) == ["CC0-1.0"]
+
+
+def test_the_episodes_are_those_asked_for(collection, monkeypatch, capsys):
+    shares = [part.share for part in collection.PARTS]
+    assert collection.shared(10000) == [100 * share for share in shares]
+    assert collection.shared(11) == [1] * 11
+    for episodes in (12, 60, 99, 176, 1234):
+        counts = collection.shared(episodes)
+        assert sum(counts) == episodes and min(counts) >= 1
+        assert all(abs(n - episodes * s / 100) <= 1 or n == 1 for n, s in zip(counts, shares)) or (
+            episodes < 100
+        )
+    monkeypatch.setattr(sys, "argv", ["collection.py", "out", "--episodes", "10"])
+    with pytest.raises(SystemExit):
+        collection.main()
+    assert "--episodes 10; expected 11 or more" in capsys.readouterr().err
 
 
 def test_a_scene_that_has_changed_is_told(collection):

@@ -76,6 +76,7 @@ def test_readings_are_shown_with_few_keys_flat_and_by_one_environment(touched):
         (["pad/5"], "'pad/5' of a task; expected 'pad', which is in every row, or a window"),
         (["pad/x"], "pad/x"),
         (["tactile"], "readings: no sensor has 'tactile'"),
+        (["q"], "readings: no sensor has 'q'; expected readings of the sensors pad, such as"),
         ("pad/1", "readings 'pad/1'; expected a list"),
     ],
 )
