@@ -91,7 +91,7 @@ class Episodes:
         self.lengths = np.asarray(lengths)
         self._index = {name: i for i, name in enumerate(self.names)}
         self._process = os.getpid()
-        self._maps: dict[int, np.memmap] = {}
+        self._maps: dict[int, np.ndarray] = {}
         self._files: dict[int, h5py.File] = {}
         self._rows: dict[str, tuple[tuple[int, ...], np.dtype]] = {}  # shape of a row, type
         self._open: OrderedDict[int, dict[str, np.ndarray]] = OrderedDict()
@@ -256,7 +256,7 @@ class Episodes:
             like = h5py.Dataset(stored)
             self._rows[name] = (like.shape[1:], like.dtype)
         shape, dtype = self._rows[name]
-        if stored.get_offset() is None or dtype.kind not in "fiu":
+        if stored.get_offset() is None or dtype.kind not in "fiub":
             return _values(h5py.Dataset(stored))
         raw = self._bytes(episode, stored.get_offset(), stored.get_storage_size())
         return raw.view(dtype).reshape(-1, *shape)
@@ -288,7 +288,8 @@ class Episodes:
     def _bytes(self, episode: int, offset: int, size: int) -> np.ndarray:
         number = self._shard_of[episode]
         if number not in self._maps:
-            self._maps[number] = np.memmap(self.files[number], mode="r")
+            # As a plain array: views of the other kind take as long as a small dataset.
+            self._maps[number] = np.memmap(self.files[number], mode="r").view(np.ndarray)
         return self._maps[number][offset : offset + size]
 
     def __getstate__(self) -> dict[str, Any]:
