@@ -109,6 +109,10 @@ class Work:
         common = sums_of(self.folder, self.format.common, self.format.by_folder)
         return joined([*(json.loads(self._sums_of(part).read_text()) for part in parts), common])
 
+    def has_sums(self, task: str) -> bool:
+        """Whether what `sums` needs of a task is there. A part of an older version has none."""
+        return not task.isdecimal() or self._sums_of(task).is_file()
+
     def _sums_of(self, part: str) -> Path:
         return self.folder / f".parts/{part}.sums"
 
@@ -196,7 +200,7 @@ class Folder:
             shutil.rmtree(self._old, ignore_errors=True)
 
     def has(self, task: str) -> bool:
-        return (self.part / ".parts" / task).is_file()
+        return (self.part / ".parts" / task).is_file() and self.work.has_sums(task)
 
     def mark(self, task: str) -> None:
         (self.part / ".parts" / task).touch()

@@ -349,7 +349,8 @@ class Windows:
     Parameters
     ----------
     path: a folder of `tangere generate`, one of its files, or an `Episodes`.
-    keys: observations to give. None: those that the task shows; of a bare scene all but q and v.
+    keys: observations to give. None: those that the task shows; of a bare scene all but q, v and
+        motions of bodies.
     before, ahead: rows before the present one, and actions from it on.
     split: a mask of robomimic.hdf5, such as "train" or "valid"; None for all episodes.
     only_success: leave out episodes that did not succeed.
@@ -387,7 +388,11 @@ class Windows:
             raise _core.InputError(f"before {before}, ahead {ahead}; expected at least 0 and 1")
         if isinstance(keys, str):
             raise _core.InputError(f"keys {keys!r}; expected a list, such as [{keys!r}]")
-        default = [key for key in self.episodes.keys if key not in ("q", "v")]
+        default = [
+            key for key in self.episodes.keys
+            if key not in ("q", "v")
+            and not (key.split(".")[0] == "bodies" and key in self.episodes.privileged)
+        ]  # fmt: skip
         self.keys = list(keys) if keys is not None else default
         unknown = [key for key in self.keys if key not in self.episodes.keys]
         if unknown or not self.keys:

@@ -11,7 +11,7 @@ import pytest
 
 import tangere
 from tangere import export as exports
-from tangere.data import Episodes
+from tangere.data import Episodes, Windows
 
 pq = pytest.importorskip("pyarrow.parquet", reason="pyarrow is not installed")
 zarr = pytest.importorskip("zarr", reason="zarr is not installed")
@@ -38,6 +38,7 @@ def rows(balls):
 
 
 def test_data_sets_say_it(balls):
+    assert Windows(balls).keys == ["pad.sum"]
     with h5py.File(balls / "shard-00000.h5") as file:
         scene = file["scene"].attrs
         assert json.loads(scene["privileged"]) == ["q", "v", "bodies.ball"]
