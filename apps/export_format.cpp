@@ -39,7 +39,7 @@ def missing(name, package):
     text += f"expected it from `{sys.executable} -m pip install {package}`, "
     text += "or another TANGERE_PYTHON"
     if name == "tangere":
-        text += ". '.[data]' is the folder of Tangere's sources"
+        text += ". Run it in the folder of Tangere's sources"
     if "--json" in words:
         print(json.dumps({"command": command, "exit_code": 3, "error": text}))
     print(f"tangere {command}: {text}", file=sys.stderr)

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <memory>
@@ -32,6 +33,10 @@ std::string scene_of_command(const std::string& command, const std::string& text
   const std::size_t end = command.find(kEnd);
   if (!command.starts_with(kBegin) || end == std::string::npos) return "";
   std::string path = command.substr(kBegin.size(), end - kBegin.size());
+  std::error_code none;
+  if (!std::filesystem::is_regular_file(path, none) ||  // a device might never end
+      std::filesystem::file_size(path, none) != text.size())
+    return "";
   std::ifstream file(path, std::ios::binary);
   const std::string found{std::istreambuf_iterator<char>(file), {}};
   return file && found == text ? path : "";

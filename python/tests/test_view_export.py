@@ -10,6 +10,7 @@ import re
 import subprocess
 import sys
 
+import h5py
 import numpy as np
 import pytest
 
@@ -98,6 +99,10 @@ def test_scenes_with_other_files_need_no_scene(generate, command, tmp_path):
     folder.rename(tmp_path / "gone")
     for path in (data, tmp_path / "out"):
         assert block(tangere.view(path).html)["sensors"] == shown
+
+    with h5py.File(data / "shard-00000.h5", "r+") as file:
+        file.attrs["command"] = "tangere generate /dev/zero --episodes 1"
+    assert block(tangere.view(data).html)["sensors"] == shown
 
     (tmp_path / "gone/ball.obj").write_text(OCTAHEDRON)
     body = text.index("<body", text.index('"ball"'))
