@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 
 import h5py
@@ -17,6 +18,7 @@ pq = pytest.importorskip("pyarrow.parquet", reason="pyarrow is not installed")
 zarr = pytest.importorskip("zarr", reason="zarr is not installed")
 pytest.importorskip("PIL.Image", reason="pillow is not installed")
 
+export = functools.partial(exports.export, workers=1)
 PAD = ["pad_joint.x", "pad_joint.y", "pad_joint.z"]
 
 
@@ -50,7 +52,7 @@ def test_data_sets_say_it(balls):
 
 @pytest.mark.parametrize("privileged", [False, True])
 def test_lerobot_splits_q_and_v(balls, rows, tmp_path, privileged):
-    done = exports.export(balls, tmp_path / "out", privileged=privileged)
+    done = export(balls, tmp_path / "out", privileged=privileged)
     info = json.loads((tmp_path / "out/meta/info.json").read_text())["features"]
     table = pq.read_table(tmp_path / "out/data/chunk-000/file-000.parquet")
 
@@ -79,8 +81,8 @@ def test_lerobot_splits_q_and_v(balls, rows, tmp_path, privileged):
 
 
 def test_zarr_splits_q_and_v(balls, rows, tmp_path):
-    exports.export(balls, tmp_path / "less", "zarr")
-    exports.export(balls, tmp_path / "all", "zarr", privileged=True)
+    export(balls, tmp_path / "less", "zarr")
+    export(balls, tmp_path / "all", "zarr", privileged=True)
     less, whole = (zarr.open_group(str(tmp_path / n), mode="r") for n in ("less", "all"))
     assert {*dict(less["data"].arrays())} == {"q", "v", "pad.sum", "action", "reward", "done"}
     assert less.attrs["privileged"] == []
@@ -94,13 +96,13 @@ def test_zarr_splits_q_and_v(balls, rows, tmp_path):
 
 
 def test_univtac_has_the_joints_of_motors(balls, rows, tmp_path, generate):
-    exports.export(balls, tmp_path / "out", "univtac", privileged=True)
+    export(balls, tmp_path / "out", "univtac", privileged=True)
     said = json.loads((tmp_path / "out/metadata.json").read_text())
     assert said["joints"] == PAD
     with h5py.File(tmp_path / "out/hdf5/1.hdf5") as file:
         np.testing.assert_array_equal(file["embodiment/joint"], np.float32(rows["q"][6:, :3]))
         np.testing.assert_array_equal(file["q"], np.float32(rows["q"][6:]))
-    exports.export(balls, tmp_path / "plain", "univtac")
+    export(balls, tmp_path / "plain", "univtac")
     with h5py.File(tmp_path / "plain/hdf5/0.hdf5") as file:
         assert "q" not in file
     text = tangere.scenes()["rolling_ball_small"].read_text()
@@ -111,20 +113,20 @@ def test_univtac_has_the_joints_of_motors(balls, rows, tmp_path, generate):
     still = generate(str(tmp_path / "still.xml"), "--episodes", "1", "--steps", "20", "--every",
                      "10", "--record", "q,pad")  # fmt: skip
     with pytest.raises(tangere.InputError, match="no joint has a motor; expected joints .* of pad"):
-        exports.export(still, tmp_path / "none", "univtac")
-    exports.export(still, tmp_path / "named", "univtac", joints="pad_joint.z")
+        export(still, tmp_path / "none", "univtac")
+    export(still, tmp_path / "named", "univtac", joints="pad_joint.z")
     with pytest.raises(tangere.InputError, match="no motor, so no action; expected"):
-        exports.export(still, tmp_path / "lerobot")
-    exports.export(still, tmp_path / "zarr", "zarr", privileged=True)
+        export(still, tmp_path / "lerobot")
+    export(still, tmp_path / "zarr", "zarr", privileged=True)
     whole = zarr.open_group(str(tmp_path / "zarr"), mode="r")
     assert whole["data/q"].shape[1] == 10 and whole.attrs["privileged"] == ["q"]
 
 
 def test_a_task_declares_what_it_shows(pushes, generate, tmp_path):
-    done = exports.export(pushes, tmp_path / "out", "zarr")
+    done = export(pushes, tmp_path / "out", "zarr")
     assert "q" not in dict(zarr.open_group(str(tmp_path / "out"), mode="r")["data"].arrays())
     assert "because a robot could not measure them: q, v; --privileged" in done.notes[0]
-    exports.export(generate("stable_grasp", "--episodes", "2"), tmp_path / "uv", "univtac")
+    export(generate("stable_grasp", "--episodes", "2"), tmp_path / "uv", "univtac")
     joints = json.loads((tmp_path / "uv/metadata.json").read_text())["joints"]
     hand = ["hand_slide.x", "hand_slide.y", "hand_slide.z", "hand_turn.angle"]
     assert joints == hand + ["left_finger.position", "right_finger.position"]  # not of the bar
