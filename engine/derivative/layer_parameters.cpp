@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One direction after the other.
+// One system of the layer for all numbers.
 #include "engine/derivative/layer_parameters.hpp"
 
 #include "engine/step/layer_sums.hpp"
@@ -17,24 +17,20 @@ namespace {
 template <int L>
 void subtract_shares(const CompiledModel& m, BasicWorkspace<L>& w, const Vec6<double>& slip,
                      int pad, int lane, LossRows<L>& loss) {
-  LayerContact& contact = *w.layer_contact;
-  std::vector<kernels::LayerBody<LayerContact::D>> bodies = contact.still_bodies();
+  std::vector<LayerContact::BodyNumbers> bodies(w.layer_members.size());
+  const LayerMaterial material = w.layer_contact->pull_back(slip, bodies);
   for (std::size_t b = 0; b < bodies.size(); ++b) {
     const int k = w.layer_members[b];
-    const auto subtract = [&](int row, LayerContact::D& number) {
-      number.epsilon = 1;
-      loss.parameters[row][lane] -= dot(slip, contact.change(bodies));
-      number.epsilon = 0;
-    };
     for (int i = 0; i < kCoefficients; ++i)
-      subtract(m.view.rows.pair(k) + i, bodies[b].touch.law[std::size_t(i)]);
+      loss.parameters[m.view.rows.pair(k) + i][lane] -= bodies[b].law[std::size_t(i)];
     for (int i = 0; i < kernels::kSizeNumbers; ++i)
-      subtract(m.view.rows.solid(m.pairs[std::size_t(k)].body2) + i, (&bodies[b].size.x)[i]);
+      loss.parameters[m.view.rows.solid(m.pairs[std::size_t(k)].body2) + i][lane] -=
+          bodies[b].size[std::size_t(i)];
   }
   if (m.layer_pads[std::size_t(pad)].layer->surface) return;  // it has no numbers of its material
   const int row = m.layer_row(m.layer_pads[std::size_t(pad)].sensor);
-  loss.parameters[row][lane] -= dot(slip, contact.change(bodies, {}, {1, 0}));
-  loss.parameters[row + 1][lane] -= dot(slip, contact.change(bodies, {}, {0, 1}));
+  loss.parameters[row][lane] -= material.thickness;
+  loss.parameters[row + 1][lane] -= material.poisson;
 }
 
 }  // namespace

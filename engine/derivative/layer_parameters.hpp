@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Derivatives of the wrenches of layers by the coefficients of their contacts, by the sizes of the
-// bodies that press them and by their own material, by dual numbers. With the slip Y along λ
+// bodies that press them and by their own material. With the slip Y along λ
 // (kernels/reverse/adjoint.hpp) each is -Yᵀ ∂w/∂p.
 #pragma once
 

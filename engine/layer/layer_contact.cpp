@@ -40,6 +40,17 @@ double component(const Vec6<double>& x, int k) {
   return all[k];
 }
 
+/// A body whose dual numbers do not change.
+LayerBody<D> still(const LayerBody<double>& of) {
+  LayerBody<D> body;
+  body.touch.Q = kernels::broadcast<D>(of.touch.Q);
+  body.touch.c = dual(of.touch.c);
+  body.touch.omega = dual(of.touch.omega), body.touch.v = dual(of.touch.v);
+  body.touch.law = transformed(of.touch.law, [](double x) { return D(x); });
+  body.size = dual(of.size);
+  return body;
+}
+
 Vec3<double> lane_of(const Vec3<kernels::LaneRow>& x, int l) { return {x.x[l], x.y[l], x.z[l]}; }
 
 }  // namespace
@@ -225,6 +236,84 @@ Vec6<double> LayerContact::change(std::span<const LayerBody<D>> bodies,
   return wrench_to_parent(pad_->frame, change_in_pad(bodies, anchors, material_dot));
 }
 
+/// T'/N of a point where its place and its surface stay.
+Vec3<D> LayerContact::changed_friction(const Point& p, const LayerBody<D>& body) const {
+  const LayerShape& of = bodies_[static_cast<std::size_t>(p.body)].shape;
+  return kernels::with_distance<D>(
+      of.shape, body.size,
+      [&](const auto& shape) {
+        return layer_friction(shape, of, body.touch, dual(p.xi), D(double(p.known.by)),
+                              dual(p.anchor), dual(p.at.slant))
+            .ratio;
+      },
+      of.grid);
+}
+
+/// Adds what one point's force changes with its own numbers, where its load P stays, but for those
+/// of kn, and with the depth by depth_bar_.
+void LayerContact::pull_back_point(const Point& p, const Vec6<double>& bar, BodyNumbers& of,
+                                   double& thickness) const {
+  const double P = p.load, F = p.friction_load;
+  const Vec3<double> g = bar.l + cross(bar.a, p.at.place), f = P * p.at.slant + F * p.friction;
+  LayerBody<D> body = still(bodies_[static_cast<std::size_t>(p.body)].motion);
+  const double normal = dot(g, f);
+  of.law[0] += normal / body.touch.law.kn.value;
+  if (p.normal > 0)
+    for (std::size_t i = 0; i < kCoefficients; ++i) {
+      body.touch.law[i].epsilon = 1;
+      of.law[i] += F * dot(g, change_of(changed_friction(p, body)));
+      body.touch.law[i].epsilon = 0;
+    }
+  const double depth_bar = depth_bar_[static_cast<std::size_t>(p.index)];
+  const auto share = [&](double thickness_dot) {
+    const PointChange change = changed(p, body, dual(p.anchor), thickness_dot);
+    return depth_bar * change.at.depth.epsilon +
+           dot(g, P * change_of(change.at.slant) + F * change_of(change.friction)) +
+           dot(bar.a, cross(change_of(change.at.place), f));
+  };
+  for (std::size_t i = 0; i < kernels::kSizeNumbers; ++i) {
+    D& size = (&body.size.x)[i];
+    size.epsilon = 1;
+    of.size[i] += share(0);
+    size.epsilon = 0;
+  }
+  if (pad_->layer->relaxation > 0) thickness += share(1);
+}
+
+LayerMaterial LayerContact::pull_back(const Vec6<double>& wrench_bar,
+                                      std::span<BodyNumbers> bodies) {
+  const Vec6<double> bar = motion_to_child(pad_->frame, wrench_bar);
+  load_bar_.assign(depth_.size(), 0.0);
+  depth_bar_.resize(depth_.size());
+  double softer = 0;  // Σ g·φ F of the points whose friction has the load of their depth
+  for_each_point([&](const Point& p) {
+    if (!(p.load > 0)) return;
+    const Vec3<double> g = bar.l + cross(bar.a, p.at.place);
+    const double area = bodies_[std::size_t(p.body)].motion.touch.law.kn * pad_->layer->area;
+    const bool whole = !(p.friction_load < p.load);
+    load_bar_[std::size_t(p.index)] =
+        area * (dot(g, p.at.slant) + (whole ? dot(g, p.friction) : 0.0));
+    if (!whole) softer += p.friction_load * dot(g, p.friction);
+  });
+  layers_[at_].pull_back(load_bar_, depth_bar_);
+  const bool has_slopes = !pad_->layer->surface;  // by the material
+  LayerMaterial material;
+  if (has_slopes) material = layers_[at_].pull_back_material(load_bar_);
+  for_each_point([&](const Point& p) {
+    if (!(p.load > 0)) return;
+    const auto body = std::size_t(p.body);
+    if (p.friction_load < p.load && p.friction_load > 0)
+      depth_bar_[std::size_t(p.index)] +=
+          point_stiffness(bodies_[body]) * dot(bar.l + cross(bar.a, p.at.place), p.friction);
+    pull_back_point(p, bar, bodies[body], material.thickness);
+  });
+  if (!has_slopes) return {};
+  const double own = pad_->layer->compliance.own;
+  material.thickness -= softer * pad_->layer->own_change({1, 0}) / own;
+  material.poisson -= softer * pad_->layer->own_change({0, 1}) / own;
+  return material;
+}
+
 void LayerContact::add_to(kernels::PairSums<double>& sums, bool derivatives) {
   sums.wrench += wrench();
   if (!derivatives || empty()) return;
@@ -254,20 +343,6 @@ Vec3<double> LayerContact::friction_bar(const Point& p, const Vec6<double>& wren
   const Vec3<double>&slant = p.at.slant, f = bar.l + cross(bar.a, p.at.place);
   return (p.friction_load / p.normal) *
          (pad_->frame.R * (f - (dot(slant, f) / dot(slant, slant)) * slant));
-}
-
-std::vector<LayerBody<D>> LayerContact::still_bodies() const {
-  std::vector<LayerBody<D>> out;
-  for (const Body& of : bodies_) {
-    const kernels::Touch<double>& t = of.motion.touch;
-    LayerBody<D> body;
-    body.touch.Q = kernels::broadcast<D>(t.Q);
-    body.touch.c = dual(t.c), body.touch.omega = dual(t.omega), body.touch.v = dual(t.v);
-    body.touch.law = transformed(t.law, [](double x) { return D(x); });
-    body.size = dual(of.motion.size);
-    out.push_back(body);
-  }
-  return out;
 }
 
 }  // namespace tangere

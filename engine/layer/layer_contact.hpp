@@ -7,6 +7,7 @@
 // direction follows from dual numbers.
 #pragma once
 
+#include <array>
 #include <span>
 #include <vector>
 
@@ -85,6 +86,15 @@ class LayerContact {
   kernels::Vec6<double> change(std::span<const kernels::LayerBody<D>> bodies,
                                std::span<const kernels::Anchor<D>> anchors = {},
                                const LayerMaterial& material_dot = {});
+  /// Cotangents of a body's coefficients, in the order of Coefficients, and of its size.
+  struct BodyNumbers {
+    std::array<double, kCoefficients> law{};
+    std::array<double, kernels::kSizeNumbers> size{};
+  };
+  /// Computes the cotangents of the numbers of the bodies, in the order of add_body(), and of the
+  /// material, from that of w: one system for all of them. Those of a material without slopes are
+  /// zero.
+  LayerMaterial pull_back(const kernels::Vec6<double>& wrench_bar, std::span<BodyNumbers> bodies);
   /// Adds w, and its derivatives by displacement and twist of the other link, to the sums.
   void add_to(kernels::PairSums<double>& sums, bool derivatives);
   /// Returns an anchor with b in pad axes instead of the axes of the pad's link.
@@ -97,8 +107,6 @@ class LayerContact {
   /// of the pad's link.
   [[nodiscard]] kernels::Vec3<double> friction_bar(const Point& point,
                                                    const kernels::Vec6<double>& wrench_bar) const;
-  /// Returns bodies whose dual numbers do not change.
-  [[nodiscard]] std::vector<kernels::LayerBody<D>> still_bodies() const;
 
  private:
   struct Body {
@@ -119,6 +127,10 @@ class LayerContact {
   void set_loads(const Body& body);
   [[nodiscard]] PointChange changed(const Point& p, const kernels::LayerBody<D>& body,
                                     const kernels::Anchor<D>& anchor, double thickness_dot) const;
+  [[nodiscard]] kernels::Vec3<D> changed_friction(const Point& p,
+                                                  const kernels::LayerBody<D>& body) const;
+  void pull_back_point(const Point& p, const kernels::Vec6<double>& bar, BodyNumbers& of,
+                       double& thickness) const;
   [[nodiscard]] kernels::Vec6<double> change_in_pad(std::span<const kernels::LayerBody<D>> bodies,
                                                     std::span<const kernels::Anchor<D>> anchors,
                                                     const LayerMaterial& material_dot);
@@ -132,6 +144,7 @@ class LayerContact {
   std::vector<int> slot_;                      // (points of the pad) number in index_, or -1
   std::vector<double> depth_;                  // (points of the pad)
   std::vector<double> depth_dot_, load_dot_;   // (points of the pad)
+  std::vector<double> depth_bar_, load_bar_;   // (points of the pad)
   std::vector<PointChange> changes_;           // of for_each_point()
   AlignedVector<double> cells_;                // (cells, kernels::kCellNumbers)
   kernels::Vec6<double> wrench_{};             // pad axes
