@@ -64,10 +64,11 @@ void check_units(const SceneNode& include, const tinyxml2::XMLElement& element,
   }
 }
 
-/// Returns the path of the file that an <include> names.
-std::string path_of(const SceneNode& include) {
+/// Returns the path of the file that an <include> names. One whose text is stored need not exist.
+std::string path_of(const SceneNode& include, bool stored) {
   SceneContext& context = include.context();
   std::vector<fs::path> folders{fs::path(context.file).parent_path()};
+  if (stored) return (folders[0] / include.text("file")).string();
   std::ranges::copy(context.outermost().folders, std::back_inserter(folders));
   try {
     return find_scene_file(include.text("file"), folders);
@@ -86,7 +87,10 @@ bool same_file(const std::string& a, const std::string& b) {
 
 const IncludedFile& include_file(const SceneNode& include, const SceneNode& parent) {
   SceneContext& outer = include.context();
-  const std::string path = path_of(include);
+  const std::string place = place_from(outer.place, include.text("file"));
+  const IncludedTexts& known = outer.outermost().included_texts;
+  const auto stored = known.find(place);
+  const std::string path = path_of(include, stored != known.end());
   refuse_rings(include, path);
   auto& all = outer.outermost().included;
   if (all.size() >= kMostFiles)
@@ -100,10 +104,8 @@ const IncludedFile& include_file(const SceneNode& include, const SceneNode& pare
   context.file = path;
   context.allow_unknown = outer.allow_unknown;
   context.includer = &outer;
-  context.place = place_from(outer.place, include.text("file"));
+  context.place = place;
   try {
-    const IncludedTexts& known = outer.outermost().included_texts;
-    const auto stored = known.find(context.place);
     const std::string text = stored != known.end()
                                  ? stored->second
                                  : read_text_file(path, kLargestInclude, "a scene file");

@@ -53,7 +53,9 @@ class StableGrasp : public Task {
         hand_(coordinate("hand_slide")),
         bar_(coordinate("bar")),
         bar_v_(dof("bar")),
-        gain_(friction == Friction::elastic ? kElasticGain : 1) {
+        script_(friction == Friction::gel       ? kGel
+                : friction == Friction::elastic ? kElastic
+                                                : kViscous) {
     for (const SensorInfo& sensor : model().sensors())
       if (model().sensors().size() != kPads || sensor.rows != kRows || sensor.cols != kCols)
         throw InputError(model().scene().path + ": stable grasp needs two pads of 13 × 10 points");
@@ -177,7 +179,7 @@ class StableGrasp : public Task {
   /// Moves towards the heavier side. The bar slides and turns in the grip at rates proportional to
   /// its weight and its moment, and shear is proportional to a point's velocity. With v downward
   /// and ω about the grip, the centre of mass is ω/v Σ r²/n away, the mean over the points that
-  /// hold the bar. Elastic friction shows how far it has slid and turned in the same way.
+  /// hold the bar. Springs and gels show how far it has slid and turned in the same way.
   void scripted(const TaskView&, std::span<const double> o,
                 std::span<double> action) const override {
     double weight = 0, moment = 0, square = 0;
@@ -189,23 +191,30 @@ class StableGrasp : public Task {
         for (std::size_t j = 0; j < kCols; ++j) {
           const std::size_t at = 2 * pad * kRows * kCols + i * kCols + j;
           const double fz = up * o[at], fy = -o[at + std::size_t{kRows} * kCols];
-          const double z = up * (static_cast<double>(i) - 6) * kPitch,
-                       y = (4.5 - static_cast<double>(j)) * kPitch;
+          const double z = up * (static_cast<double>(i) - 6) * script_.pitch,
+                       y = (4.5 - static_cast<double>(j)) * script_.pitch;
           weight += fz;
           moment += y * fz - z * fy;
           square += y * y + z * z;
         }
     }
     constexpr double kPoints = kPads * kRows * kCols;
-    const double away = moment / square / (weight / kPoints) * kMeanSquare;
-    action[0] = std::isfinite(away) ? std::clamp(gain_ * away / kReach, -1.0, 1.0) : 0;
+    const double away = moment / square / (weight / kPoints) * script_.mean_square;
+    action[0] = std::isfinite(away) ? std::clamp(script_.gain * away / kReach, -1.0, 1.0) : 0;
   }
 
  private:
-  static constexpr double kPitch = 1.5e-3;  // distance between neighbouring points of a pad [m]
-  static constexpr double kMeanSquare =
-      0.4545 * 0.018 * 0.018;                  // mean of r² over a pad's 33 contact points [m²]
-  static constexpr double kElasticGain = 0.4;  // from a search; larger ones overshoot
+  struct Script {
+    double pitch;        ///< distance between neighbouring points of a pad [m]
+    double mean_square;  ///< of r over the points of a pad that hold the bar [m²]
+    double gain;         ///< share of the distance that the script moves
+  };
+  // The 33 contact points of a pad hold the bar; a gel holds it with those that it senses. The
+  // gain of springs is from a search; larger ones overshoot.
+  static constexpr double kContactPoints = 0.4545 * 0.018 * 0.018,
+                          kGelPoints = 2e-3 * 2e-3 * (kRows * kRows + kCols * kCols - 2) / 12;
+  static constexpr Script kViscous{1.5e-3, kContactPoints, 1},
+      kElastic{1.5e-3, kContactPoints, 0.4}, kGel{2e-3, kGelPoints, 1};
 
   /// Where the current action grasps [m].
   static double place(const TaskView& view) {
@@ -222,7 +231,7 @@ class StableGrasp : public Task {
   }
 
   std::size_t hand_, bar_, bar_v_;
-  double gain_;  // share of the distance that the script moves
+  Script script_;
 };
 
 }  // namespace

@@ -25,6 +25,7 @@ std::vector<Entry>& entries() {
       entry(declare_ball_rolling, make_ball_rolling, BallPad::small),
       entry(declare_stable_grasp, make_stable_grasp, Friction::viscous),
       entry(declare_stable_grasp, make_stable_grasp, Friction::elastic),
+      entry(declare_stable_grasp, make_stable_grasp, Friction::gel),
       entry(declare_box_pushing, make_box_pushing, Push::tactile, Friction::viscous),
       entry(declare_box_pushing, make_box_pushing, Push::privileged, Friction::viscous),
       entry(declare_box_pushing, make_box_pushing, Push::reduced, Friction::viscous),
@@ -71,9 +72,11 @@ void add_task(const OwnTask& task) {
 
 TaskSpec with_friction(TaskSpec spec, Friction friction) {
   if (friction == Friction::viscous) return spec;
-  spec.name += "_elastic";
+  const bool gel = friction == Friction::gel;
+  spec.name += gel ? "_gel" : "_elastic";
   spec.scene = spec.name + ".xml";
-  spec.summary = "The same; contacts and skins keep their shear.";
+  spec.summary = gel ? "The same; the pads are gels, whose layers are the contact."
+                     : "The same; contacts and skins keep their shear.";
   return spec;
 }
 

@@ -39,9 +39,9 @@ enum class BallPad { large, small };
 TaskSpec declare_ball_rolling(BallPad pad);
 std::unique_ptr<Task> make_ball_rolling(const Scene& scene, BallPad pad);
 
-/// The friction of contacts and skins: the paper's dampers alone, or springs beside them (`ks`), on
-/// the scene NAME_elastic.xml.
-enum class Friction { viscous, elastic };
+/// The friction of contacts and skins: the paper's dampers alone; springs beside them (`ks`), on
+/// the scene NAME_elastic.xml; or those springs in gels that are the contact, on NAME_gel.xml.
+enum class Friction { viscous, elastic, gel };
 /// Returns the declaration of a task with that friction.
 TaskSpec with_friction(TaskSpec spec, Friction friction);
 

@@ -120,6 +120,7 @@ TEST(ShippedScenes, AreAllRunHere) {
                                      "rolling_ball_small",
                                      "stable_grasp",
                                      "stable_grasp_elastic",
+                                     "stable_grasp_gel",
                                      "ten_boxes",
                                      "grip_rod",
                                      "gel_press",
