@@ -190,17 +190,15 @@ std::vector<std::string> transmissions_outside_limits(const Model& model) {
   for (std::size_t k = 0; k < m.joints.size(); ++k) {
     const JointDescription& joint = m.scene.links[k].joint;
     if (!joint.limits || !(joint.limit_stiffness > 0)) continue;
-    if (std::ranges::none_of(m.scene.transmissions,
-                             [&](const auto& t) { return t.joint == joint.name; }))
-      continue;
+    if (!is_transmission(m.scene, joint)) continue;
     const double at = q[std::size_t(m.joints[k].q)];
     const auto [low, high] = *joint.limits;
     const double slack = kRounding * (std::abs(low) + std::abs(high));
     if (at >= low - slack && at <= high + slack) continue;
     found.push_back(fmt::format(
         "{}the transmission of joint '{}' starts at {:.4g} m, outside its limits {:.4g} "
-        "{:.4g}; the springs of limits push from the first step on; expected another "
-        "path or state, or other limits",
+        "{:.4g}; the springs of limits push from the first step on; if it is not meant to start "
+        "taut, expected another path or state, or other limits",
         joint.source.prefix(), joint.name, at, low, high));
   }
   return found;

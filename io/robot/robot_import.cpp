@@ -52,12 +52,17 @@ double largest_force(const MotorDescription& m) {
   return largest;
 }
 
-/// The force with which a position motor moves its joint from one end of the targets to the other;
-/// 0 for other motors, and where the targets have no bound.
-double force_across_targets(const MotorDescription& m) {
+/// The force with which a position motor moves its joint from one end of the targets to the other,
+/// or from one limit to the other if the targets have no bound; 0 for other motors, and where
+/// neither has one.
+double force_across_targets(const MotorDescription& m, const JointDescription& joint) {
   if (m.control != MotorControl::position) return 0;
-  const double span = std::abs(m.scale.value_or(1)) * (m.u_range[1] - m.u_range[0]);
-  return std::isfinite(span) ? std::min(m.P * span, std::max(std::abs(m.low), m.high)) : 0;
+  double span = std::abs(m.scale.value_or(1)) * (m.u_range[1] - m.u_range[0]);
+  if (!std::isfinite(span)) {
+    if (!joint.limits) return 0;
+    span = (*joint.limits)[1] - (*joint.limits)[0];
+  }
+  return std::min(m.P * span, std::max(std::abs(m.low), m.high));
 }
 
 /// The force or torque that a limit should hold: the weight of what hangs on the joint, or its
@@ -85,8 +90,8 @@ class LimitLoads {
       load = std::max(load, effort->second);
     for (const MotorDescription& m : scene_.motors)
       if (m.joint == joint.name)
-        load = std::max(
-            {load, largest_force(m), holder_ == Holder::loop ? force_across_targets(m) : 0.0});
+        load = std::max({load, largest_force(m),
+                         holder_ == Holder::loop ? force_across_targets(m, joint) : 0.0});
     if (is_transmission(scene_, joint)) load = std::max(load, whole_weight());
     for (std::size_t k = 0; k < joint.follows.size() && weight(i) == 0; ++k)
       for (std::size_t leader = 0; leader < scene_.links.size(); ++leader)

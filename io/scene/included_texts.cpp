@@ -6,8 +6,10 @@
 
 #include <filesystem>
 #include <string_view>
+#include <vector>
 
 #include "io/files/text_file.hpp"
+#include "io/scene/scene_folders.hpp"
 
 namespace tangere {
 namespace {
@@ -16,36 +18,39 @@ namespace fs = std::filesystem;
 
 class IncludeWalk {
  public:
-  explicit IncludeWalk(const std::string& path) : folder_(fs::path(path).parent_path()) {}
+  IncludeWalk() : folders_(shipped_scenes()) { folders_.emplace(folders_.begin()); }
 
-  void add_from(const std::string& place, const std::string& text) {
+  /// `path`: of the file with this text.
+  void add_from(const std::string& place, const fs::path& path, const std::string& text) {
     tinyxml2::XMLDocument document;
     if (document.Parse(text.data(), text.size()) != tinyxml2::XML_SUCCESS) return;
     for (const auto* root = document.RootElement(); root != nullptr;
          root = root->NextSiblingElement())
-      add_below(*root, place);
+      add_below(*root, place, path);
   }
   IncludedTexts texts;
 
  private:
-  void add_below(const tinyxml2::XMLElement& element, const std::string& place) {
+  void add_below(const tinyxml2::XMLElement& element, const std::string& place,
+                 const fs::path& path) {
     const char* const named = element.Attribute("file");
     if (std::string_view(element.Name()) == "include" && named != nullptr)
-      add(place_from(place, named));
+      add(place_from(place, named), path, named);
     for (const auto* child = element.FirstChildElement(); child != nullptr;
          child = child->NextSiblingElement())
-      add_below(*child, place);
+      add_below(*child, place, path);
   }
 
-  void add(const std::string& place) {
+  void add(const std::string& place, const fs::path& includer, const std::string& named) {
     if (texts.contains(place)) return;
-    const std::string path = (folder_ / place).string();
+    folders_.front() = includer.parent_path();
+    const std::string path = find_scene_file(named, folders_);
     const std::string text = read_text_file(path, kLargestInclude, "a scene file");
     texts[place] = text;
-    add_from(place, text);
+    add_from(place, path, text);
   }
 
-  fs::path folder_;
+  std::vector<fs::path> folders_;  // beside the including file, then as the reader searches
 };
 
 }  // namespace
@@ -55,8 +60,8 @@ std::string place_from(const std::string& place, const std::string& named) {
 }
 
 IncludedTexts included_texts(const std::string& path, const std::string& text) {
-  IncludeWalk walk(path);
-  if (!path.empty()) walk.add_from("", text);
+  IncludeWalk walk;
+  if (!path.empty()) walk.add_from("", path, text);
   return std::move(walk.texts);
 }
 

@@ -37,6 +37,7 @@ class SensorWarnings {
     std::set<std::string> without;  // distance, and free to move against the sensor
     for (std::size_t k = 0; k < scene_.links.size(); ++k) {
       if (moving_link(scene_, static_cast<int>(k)) == own_) continue;
+      if (is_transmission(scene_, scene_.links[k].joint)) continue;  // it has no place
       const BodyDescription& body = scene_.links[k].body;
       if (!has_distance(body.shape)) without.insert(body.name);
     }
@@ -143,6 +144,7 @@ class SensorWarnings {
   /// Bodies do not stop at points beside or above what moves rigidly with the sensor's body, so
   /// such points read forces that nothing exerts. Half the distance between points is allowed.
   void warn_of_points_beside() {
+    if (is_the_contact()) return;
     struct Part {
       const Shape& shape;
       kernels::Frame<double> in_group;
@@ -151,6 +153,7 @@ class SensorWarnings {
     kernels::Frame<double> own = kIdentityFrame;
     for (const LinkDescription& link : scene_.links) {
       if (group_of(link.body.name) != own_) continue;
+      if (std::holds_alternative<AbstractShape>(link.body.shape)) continue;
       if (!distance_from(link.body.shape, {0, 0, 0})) return;  // a mesh may carry the points
       parts.push_back({link.body.shape, frame_in_group(link)});
       if (link.body.name == sensor_.body) own = parts.back().in_group;
@@ -176,6 +179,13 @@ class SensorWarnings {
                       "to it, where bodies reach without a contact, so they read forces that "
                       "nothing exerts; expected points on its surface, to {:.2g} m",
                       beside, points.size(), most, allowed));
+  }
+
+  /// Whether bodies touch the sensor's points themselves.
+  [[nodiscard]] bool is_the_contact() const {
+    return (sensor_.layer && sensor_.layer->feedback) ||
+           std::ranges::any_of(scene_.pair_contacts,
+                               [&](const auto& c) { return c.sensor == sensor_.name; });
   }
 
   /// The frame of a link's body in the frame of the moving link that it is rigidly joined to.
@@ -267,10 +277,6 @@ class Starts {
   std::vector<std::optional<Start>> starts_;  // (links); empty: not computed yet
 };
 
-bool is_path_length(const Scene& scene, const std::string& joint) {
-  return std::ranges::any_of(scene.transmissions, [&](const auto& t) { return t.joint == joint; });
-}
-
 }  // namespace
 
 void warn_of_starts(const Scene& scene, const SceneNode& root) {
@@ -284,7 +290,7 @@ void warn_of_starts(const Scene& scene, const SceneNode& root) {
     const JointDescription& joint = scene.links[k].joint;
     if (joint.type != JointType::revolute && joint.type != JointType::prismatic) continue;
     if (!joint.limits || joint.limit_stiffness <= 0) continue;
-    if (is_path_length(scene, joint.name)) continue;  // lengths_outside_limits() tests it
+    if (is_transmission(scene, joint)) continue;  // transmissions_outside_limits() tests it
     const auto [q, drawn] = starts.at(k);
     if (drawn) continue;
     const auto [low, high] = *joint.limits;

@@ -236,7 +236,8 @@ TEST(RobotMotion, LoopsHoldTheForceAcrossTargets) {
   const auto stiffness = [](const std::string& motor) {
     const testing::Folder folder;
     std::ofstream(folder / "robot.xml")
-        << "<mujoco><worldbody><body name=\"a\"><joint name=\"j\" axis=\"0 1 0\"/>"
+        << "<mujoco><worldbody><body name=\"a\"><joint name=\"j\" axis=\"0 1 0\" "
+           "range=\"-14.3239448783 14.3239448783\"/>"
            "<geom size=\"0.01\" pos=\"0.1 0 0\"/></body></worldbody><equality><connect body1=\"a\" "
            "anchor=\"0.5 0 0\"/></equality><actuator>" +
                motor + "</actuator></mujoco>";
@@ -249,6 +250,7 @@ TEST(RobotMotion, LoopsHoldTheForceAcrossTargets) {
   EXPECT_DOUBLE_EQ(stiffness("<position joint=\"j\" kp=\"100\" ctrllimited=\"true\" "
                              "ctrlrange=\"-1 1\" forcelimited=\"true\" forcerange=\"-50 50\"/>"),
                    1e8);
+  EXPECT_DOUBLE_EQ(stiffness("<position joint=\"j\" kp=\"100\"/>"), 1e8);  // limits: +-0.25 rad
   EXPECT_LT(stiffness("<motor joint=\"j\" ctrllimited=\"true\" ctrlrange=\"-0.01 0.01\"/>"), 1e6);
 }
 

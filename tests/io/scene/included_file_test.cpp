@@ -67,6 +67,18 @@ TEST(SceneInclude, TextsTakeThePlaceOfFiles) {
   EXPECT_TRUE(included_texts("", scene).empty());  // of text in memory nothing is known
 }
 
+/// A layout that comes with the program is stored as well.
+TEST(SceneInclude, TextsOfShippedFilesAreStored) {
+  const testing::Folder folder;
+  const std::string text =
+      "<tangere><option unit=\"m-kg\"/><include file=\"rolling_ball_small.xml\"/></tangere>";
+  const std::string path = folder / "scene.xml";
+  std::ofstream(path) << text;
+  const IncludedTexts texts = included_texts(path, text);
+  ASSERT_EQ(texts.size(), 1U);
+  EXPECT_THAT(texts.at("rolling_ball_small.xml"), HasSubstr("rolling_ball_small"));
+}
+
 /// Files of one folder; the first is read.
 class SceneFiles {
  public:

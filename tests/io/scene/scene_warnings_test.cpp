@@ -100,6 +100,10 @@ TEST(SceneWarnings, PointsBesideTheFaceAreTold) {
     return g.warnings();
   };
   EXPECT_THAT(with_part("fixed"), IsEmpty());
+  g.inside_finger =
+      "<link name=\"i\"><joint name=\"i\" type=\"fixed\"/><body name=\"i\" type=\"abstract\" "
+      "mass=\"1\" inertia=\"1 1 1\"/></link>";
+  EXPECT_THAT(g.warnings(), ElementsAre(HasSubstr("10 of 25")));  // a part without a surface
   EXPECT_THAT(with_part("revolute\" axis=\"1 0 0"), ElementsAre(HasSubstr("10 of 25")));
 }
 
