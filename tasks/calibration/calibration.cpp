@@ -16,12 +16,17 @@
 namespace tangere {
 namespace {
 
-constexpr double kStuck = 1e3, kSlipStart = 0.9;  // of the largest ratio of shear to normal force
-constexpr double kStiffStart = 3;                 // of the spring that fits without slip
-constexpr int kFrictionPasses = 5;                // each is a twentieth to a tenth as far off
-constexpr double kUnlike = 0.3;                   // correlation of forces that have one sign
-constexpr double kSliderStart = 0.1;              // of the peak
-constexpr double kSmallest = 0.05;  // of the peak: smaller forces have no error of their own
+constexpr double kStuck = 1e3;  // of the largest ratio of shear to normal force
+/// Where fits of a shear begin: the friction, of that ratio, and the spring, of the one that fits
+/// without slip. All points slip at the first, those at the rim then, and hardly any at the last.
+struct SlipStart {
+  double friction, stiffness;
+};
+constexpr SlipStart kSlipStarts[] = {{0.9, 3}, {1.2, 1.5}, {1.6, 1.2}, {2.2, 1.1}, {4, 1.02}};
+constexpr int kFrictionPasses = 5;    // each is a twentieth to a tenth as far off
+constexpr double kUnlike = 0.3;       // correlation of forces that have one sign
+constexpr double kSliderStart = 0.1;  // of the peak
+constexpr double kSmallest = 0.05;    // of the peak: smaller forces have no error of their own
 
 const std::string kDepth = "table_depth";
 
@@ -223,7 +228,8 @@ void scale_start(const CalibrationRequest& request, const PressRecording& r, dou
 /// move a friction at which nothing slips.
 void scale_shear_start(const Forces& shear, const std::vector<std::string>& names,
                        const SkinNumbers& fixed, std::span<const double> normal,
-                       std::span<const double> recorded, SkinNumbers& start) {
+                       std::span<const double> recorded, const SlipStart& slip,
+                       SkinNumbers& start) {
   double ratio = 0;
   for (std::size_t k = 0; k < normal.size(); ++k)
     if (normal[k] > 0) ratio = std::max(ratio, std::abs(recorded[k]) / normal[k]);
@@ -233,9 +239,9 @@ void scale_shear_start(const Forces& shear, const std::vector<std::string>& name
     stuck[kShear] = start.at(kShear);
     stuck[kFriction] = kStuck * ratio;
     const double factor = best_factor(shear(stuck), recorded);
-    if (factor > 0 && std::isfinite(factor)) start[kShear] *= kStiffStart * factor;
+    if (factor > 0 && std::isfinite(factor)) start[kShear] *= slip.stiffness * factor;
   }
-  start[kFriction] = kSlipStart * ratio;
+  start[kFriction] = slip.friction * ratio;
 }
 
 /// Refuses a shear force whose sign is that of the indenter's other side.
@@ -325,6 +331,15 @@ void add_fit(const ForceFit& fit, Calibration& out) {
   out.untold.insert(out.untold.end(), fit.untold().begin(), fit.untold().end());
 }
 
+/// Refuses a table of more numbers than rows. Of others the confidence says what is not told.
+void check_table_rows(const CalibrationRequest& request, const Names& names, std::size_t rows) {
+  if (std::ranges::count(names.normal, kTable) == 0) return;
+  const std::size_t fitted = names.normal.size() + std::size_t(request.knots) - 1;
+  if (fitted > rows)
+    throw InputError(
+        fmt::format("{} rows to fit {} numbers; expected a row for each at least", rows, fitted));
+}
+
 }  // namespace
 
 std::vector<int> held_out_rows(double hold_out, int rows) {
@@ -353,6 +368,7 @@ Calibration calibrate(const CalibrationRequest& request, const PressRecording& r
     throw InputError(
         fmt::format("a table up to the depth {} m; expected depths positive into the skin", depth));
   const Names names = choose_numbers(request, recording, rows, out.untold);
+  check_table_rows(request, names, rows.size());
   if (!names.shear.empty() && !(peak_of(recording.shear_force) > 0))
     throw InputError("a shear without any force; expected shear forces, or no columns of a shear");
 
@@ -390,13 +406,22 @@ Calibration calibrate(const CalibrationRequest& request, const PressRecording& r
     const SkinNumbers numbers = full(chosen);
     return shear_forces(request.scene(numbers), acting_depths(recording, numbers), recording.shear);
   };
-  if (std::ranges::count(names.shear, kFriction) > 0)
-    scale_shear_start(path, names.shear, out.found, normal, recording.shear_force, start);
-  SkinNumbers begin = out.found;
-  for (const std::string& name : names.shear) begin[name] = start.at(name);  // none: a score
-  check_shear_sign(path, begin, recording.shear_force);
-  ForceFit across(path, recording.shear_force, rows, depth, 0);
-  across.run(names.shear, start, out.found);
+  const auto fit_from = [&](const std::optional<SlipStart>& slip) {
+    SkinNumbers at = start;
+    if (slip)
+      scale_shear_start(path, names.shear, out.found, normal, recording.shear_force, *slip, at);
+    SkinNumbers begin = out.found;
+    for (const std::string& name : names.shear) begin[name] = at.at(name);  // none: a score
+    check_shear_sign(path, begin, recording.shear_force);
+    ForceFit fit(path, recording.shear_force, rows, depth, 0);
+    fit.run(names.shear, at, out.found);
+    return std::pair{error_of(path(fit.found()), recording.shear_force, rows).root_mean_square,
+                     fit};
+  };
+  const bool slips = std::ranges::count(names.shear, kFriction) > 0;
+  auto [least, across] = fit_from(slips ? std::optional(kSlipStarts[0]) : std::nullopt);
+  for (std::size_t k = 1; slips && k < std::size(kSlipStarts); ++k)
+    if (auto [error, fit] = fit_from(kSlipStarts[k]); error < least) least = error, across = fit;
   across.add_errors_of(along);
   add_fit(across, out);
   if (std::ranges::count(across.untold(), kFriction, &UntoldNumber::name) > 0)

@@ -443,6 +443,8 @@ TEST(Calibrate, SaysWhatIsWrong) {
   EXPECT_THAT(err("depth,force,depth\n1,2,1\n", flat), HasSubstr("two columns 'depth'"));
   EXPECT_THAT(err("1,2\n", flat), HasSubstr("p.csv:1: no names of columns"));
   EXPECT_THAT(err(kTable, flat + Words{"--fit", "mu"}), HasSubstr("nothing is sheared"));
+  EXPECT_THAT(err(kTable, flat + Words{"--table", "64"}),
+              HasSubstr("expected a row for each at least"));
   EXPECT_THAT(err(kTable, flat + Words{"--fit", "lag"}), HasSubstr("has no times"));
   EXPECT_THAT(err(kTable, flat + Words{"--table", "3", "--fit", "zero"}),
               HasSubstr("a table without 'pressure'"));

@@ -100,5 +100,29 @@ TEST(FrictionShare, AFitWithFrictionFindsTheNumbers) {
   EXPECT_THROW(calibrate(request, sheared), InputError);
 }
 
+/// The rim of a contact slips and its middle sticks. Fits that begin with a slip of all points end
+/// elsewhere.
+TEST(FrictionShare, AShearThatSlipsAtTheRimIsFound) {
+  CalibrationRequest request = press_request();
+  request.scene = [](const SkinNumbers& numbers) {
+    Scene scene = parse_scene(press_text(1e5, 0, 1), "press.xml").scene;
+    ContactCoefficients& c = scene.sensors[0].coefficients;
+    for (const auto& [name, value] : numbers)
+      (name == "ks" ? c.ks : name == "mu" ? c.mu : c.kn) = name == "zero" ? c.kn : value;
+    return placed_indenter(scene);
+  };
+  const SkinNumbers truth{{"kn", 1.5e8}, {"ks", 6e7}, {"mu", 0.6}};
+  request.start = {{"kn", 1e8}, {"ks", 4e7}, {"mu", 1}};
+  request.numbers = {"kn", "ks", "mu"};
+  PressRecording r;
+  for (int k = 1; k <= 10; ++k) r.depth.push_back(5e-5 * k), r.shear.push_back(0);
+  for (int k = 1; k <= 10; ++k) r.depth.push_back(5e-4), r.shear.push_back(1.5e-5 * k);
+  r.force = press_forces(request.scene(truth), r.depth, std::vector<double>(r.depth.size()));
+  r.shear_force = shear_forces(request.scene(truth), r.depth, r.shear);
+  const Calibration found = calibrate(request, r);
+  for (const auto& [name, value] : truth)
+    EXPECT_NEAR(found.found.at(name), value, 1e-3 * value) << name;
+}
+
 }  // namespace
 }  // namespace tangere

@@ -22,8 +22,8 @@ int episodes() {
 }
 
 /// `documented`: the rate in docs/tasks.md. The measured rate, which it returns, is at least that,
-/// less half of its 95 % interval. `failed`: simulations without a solution, flagged by their status
-/// (docs/tasks.md). `share`: one of so many episodes is played.
+/// less half of its 95 % interval. `failed`: simulations without a solution, flagged by their
+/// status (docs/tasks.md). `share`: one of so many episodes is played.
 double expect_rate(const Task& task, double documented, int failed, int share) {
   const int count = episodes() / share;
   const Played scripted = play_episodes(task, PolicyKind::scripted, count);
