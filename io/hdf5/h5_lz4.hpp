@@ -9,6 +9,10 @@ namespace tangere::h5 {
 /// Registers the filter that reads such chunks. Thread-safe.
 void allow_lz4();
 
+/// The filter as H5Zregister() takes it, an H5Z_class2_t that stays. Another copy of the library in
+/// this process, such as that of h5py, may register it for itself.
+const void* lz4_filter();
+
 /// RAII: chunks that this thread reads must unpack to exactly this number of bytes; 0: any. The
 /// library does not check this and reads beyond the end of shorter chunks.
 class ExpectedChunk {

@@ -2,10 +2,12 @@
 // Whether files of data sets and of exports are whole.
 #include <nanobind/stl/filesystem.h>
 
+#include <cstdint>
 #include <filesystem>
 
 #include "io/dataset/shard_check.hpp"
 #include "io/export/exported_set.hpp"
+#include "io/hdf5/h5_lz4.hpp"
 #include "python/module/module.hpp"
 
 namespace tangere::python {
@@ -18,6 +20,8 @@ namespace {
 /// Keeps the GIL: h5py may share the library for HDF5 (episode_writer.cpp).
 void check_file(const std::filesystem::path& path) { check_shard(path.string()); }
 
+std::uintptr_t filter_address() { return reinterpret_cast<std::uintptr_t>(h5::lz4_filter()); }
+
 void check_export(const std::filesystem::path& path) { find_export(path.string()); }
 
 }  // namespace
@@ -26,6 +30,9 @@ void add_data_files(nb::module_& m) {
   m.def("check_shard", check_file, "path"_a,
         "Reads a file of a data set whole. IoError: it cannot be read, or its numbers or its\n"
         "description do not have the checksums that it stores; the message names both.");
+  m.def("lz4_filter", filter_address,
+        "The address of HDF5's filter 32004, which unpacks LZ4, as h5py.h5z.register_filter() "
+        "takes it.");
   m.def("check_export", check_export, "path"_a,
         "Compares counts and sizes of the files of an export. IoError: one is missing or differs.");
 }

@@ -25,6 +25,10 @@ __all__ = ["Episodes", "Windows", "generate"]
 Form = Literal["stored", "image", "points"]
 Scale = Literal["task", "standard", "none"]
 
+_LZ4 = 32004  # HDF5's number of a filter, which h5py does not have
+if not h5py.h5z.filter_avail(_LZ4):
+    h5py.h5z.register_filter(_core.lz4_filter())
+
 _CACHED_BYTES = 1 << 28  # of arrays in chunks, which cannot be mapped
 _FLOOR = 0.05  # of a key's root mean square: the least standard deviation that is divided by
 
