@@ -21,7 +21,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kDeepest = 4;  // nesting of the groups of a demo
+constexpr std::int64_t kMostCounted = 1'000'000'000'000;  // episodes of a damaged file
+constexpr int kDeepest = 4;                               // nesting of the groups of a demo
 
 /// Matches names like "shard-00042.h5".
 bool is_shard(std::string_view name) {
@@ -57,11 +58,16 @@ std::vector<std::string> shards_beside(const std::string& path) {
   }
 }
 
-/// Compares the files with the number of shards in the settings.
-void count_shards(DatasetFiles& dataset) {
-  const std::string text = value_of(dataset.settings, "dataset_shards");
+std::int64_t count_in(const std::vector<Setting>& settings, const std::string& name) {
+  const std::string text = value_of(settings, name);
   std::int64_t count = 0;
   std::from_chars(text.data(), text.data() + text.size(), count);
+  return count;
+}
+
+/// Compares the files with the number of shards in the settings.
+void count_shards(DatasetFiles& dataset) {
+  const std::int64_t count = count_in(dataset.settings, "dataset_shards");
   if (count < 1 || count > kMostShards)
     throw IoError(fmt::format("'{}' counts {} shards; expected 1 to {}", dataset.files.front(),
                               count, kMostShards));
@@ -77,6 +83,67 @@ void count_shards(DatasetFiles& dataset) {
       dataset.missing.push_back(path);
   }
   dataset.surplus.insert(dataset.surplus.end(), file, dataset.files.end());
+}
+
+struct HeldEpisodes {
+  std::string file;
+  std::int64_t shard = 0;  ///< that its name says
+  EpisodeRange there;
+};
+
+/// What shards say that they hold. Leaves out files that cannot be read.
+std::vector<HeldEpisodes> held_episodes(const DatasetFiles& dataset) {
+  std::vector<HeldEpisodes> held;
+  for (const std::string& file : dataset.files) {
+    const std::string stem = fs::path(file).stem().string();
+    HeldEpisodes one{file, 0, {}};
+    const std::size_t dash = stem.find('-') + 1;
+    std::from_chars(stem.data() + dash, stem.data() + stem.size(), one.shard);
+    try {
+      const h5::Id there = h5::open_file(file);
+      const auto first = h5::read_number<std::int64_t>(there, "first_episode"),
+                 count = h5::read_number<std::int64_t>(there, "episodes");
+      if (first < 0 || count < 0 || first > kMostCounted || count > kMostCounted) continue;
+      one.there = {first, first + count};
+    } catch (const IoError&) {
+      continue;
+    }
+    held.push_back(one);
+  }
+  return held;
+}
+
+/// File and message of shards that hold other episodes than their numbers say. Episodes are shared
+/// out by the number of shards or by their size, so the way that more files agree with counts.
+std::vector<std::pair<std::string, std::string>> misplaced_episodes(const DatasetFiles& dataset) {
+  DatasetLayout by_number;
+  by_number.episodes = count_in(dataset.settings, "dataset_episodes");
+  by_number.shards = count_in(dataset.settings, "dataset_shards");
+  if (dataset.folder.empty() || by_number.shards < 1 || by_number.episodes < 1 ||
+      by_number.episodes > kMostCounted)
+    return {};
+  std::int64_t most = 0;
+  const std::vector<HeldEpisodes> held = held_episodes(dataset);
+  for (const HeldEpisodes& one : held) most = std::max(most, one.there.end - one.there.first);
+  const auto compare = [&](const auto& range_of) {
+    std::vector<std::pair<std::string, std::string>> found;
+    for (const HeldEpisodes& one : held) {
+      if (one.shard < 0 || one.shard >= by_number.shards) continue;
+      const EpisodeRange expected = range_of(one.shard);
+      if (one.there.first != expected.first || one.there.end != expected.end)
+        found.emplace_back(
+            one.file, fmt::format("holds episodes {} to {}; expected {} to {}", one.there.first,
+                                  one.there.end - 1, expected.first, expected.end - 1));
+    }
+    return found;
+  };
+  auto found = compare([&](std::int64_t shard) { return by_number.shard_episodes(shard); });
+  const std::int64_t all = by_number.episodes;
+  if (found.empty() || most < 1 || (all - 1) / most + 1 != by_number.shards) return found;
+  auto by_size = compare([&](std::int64_t shard) {
+    return EpisodeRange{shard * most, std::min(all, (shard + 1) * most)};
+  });
+  return by_size.size() <= found.size() ? by_size : found;
 }
 
 /// Compares the settings of a file with those of the data set. Damage counts as a difference.
@@ -197,6 +264,8 @@ void check_complete(const DatasetFiles& dataset) {
     throw IoError(fmt::format("'{}' is not one of the {} shards that '{}' counts; remove it",
                               dataset.surplus.front(), value_of(dataset.settings, "dataset_shards"),
                               dataset.files.front()));
+  if (const auto misplaced = misplaced_episodes(dataset); !misplaced.empty())
+    throw IoError(fmt::format("'{}' {}", misplaced.front().first, misplaced.front().second));
 }
 
 DatasetReport examine_dataset(const DatasetFiles& dataset) {
@@ -204,6 +273,8 @@ DatasetReport examine_dataset(const DatasetFiles& dataset) {
   for (const std::string& file : dataset.missing) report.problems.push_back(file + ": missing");
   for (const std::string& file : dataset.surplus)
     report.problems.push_back(file + ": not one of the shards that are counted");
+  for (const auto& [file, problem] : misplaced_episodes(dataset))
+    report.problems.push_back(fmt::format("{}: {}", file, problem));
   for (const std::string& file : dataset.files) {
     for (const std::string& line : differences_of(file, dataset.settings))
       report.problems.push_back(fmt::format("{}: {}", file, line));

@@ -31,12 +31,13 @@ DatasetFiles find_dataset(const std::string& path);
 /// Files that a merge made of the folder count as inputs, too (io/files/input_files.hpp).
 void add_merged_inputs(const DatasetFiles& dataset);
 
-/// Throws IoError when shards are missing, when shards differ in their settings, or when a file has
-/// a shard's name but is no shard. The message names the first such file.
+/// Throws IoError when shards are missing, when shards differ in their settings, when a file has a
+/// shard's name but is no shard, or when one holds other episodes than its number says. The message
+/// names the first such file.
 void check_complete(const DatasetFiles& dataset);
 
 /// Reads everything and reports all that is wrong, each with its file: shards that are missing,
-/// surplus, damaged, or have other settings.
+/// surplus, damaged, have other settings or other episodes.
 struct DatasetReport {
   std::vector<std::string> problems;
   std::int64_t shards = 0, demos = 0, failed = 0, rows = 0;

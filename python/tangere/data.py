@@ -88,6 +88,8 @@ class Episodes:
                 for name, demo in file["data"].items():
                     rows = int(demo.attrs["num_samples"])
                     found.append((int(name.removeprefix("demo_")), name, number, rows))
+        if not one:
+            _core.check_dataset(self.path)
         for _, name, number, rows in sorted(found):
             self.names.append(name)
             self._shard_of.append(number)

@@ -13,6 +13,7 @@ namespace tangere {
 namespace {
 
 namespace fs = std::filesystem;
+using ::testing::AllOf;
 using testing::dataset_layout;
 using ::testing::ElementsAre;
 using testing::Folder;
@@ -103,6 +104,42 @@ TEST(DatasetShared, IsNotCompleteWithAFileThatIsNoneOfItsShards) {
     FAIL() << "one is too many";
   } catch (const IoError& error) {
     EXPECT_THAT(error.what(), HasSubstr("shard-00007.h5' is not one of the 3 shards that '"));
+  }
+}
+
+/// 80 episodes in shards of 48 and 32, shared out by size, or of 32 and 48, by number.
+DatasetLayout two_shards(bool by_size) {
+  DatasetLayout l = dataset_layout(80);
+  if (by_size)
+    l.shard_bytes = 3.5 * kShardBlock * l.episode_bytes();
+  else
+    l.shards = 2;
+  return l;
+}
+
+TEST(DatasetShared, ACopyOfAnotherShardIsNoneOfItsEpisodes) {
+  for (const bool by_size : {false, true}) {
+    const Folder folder;
+    const DatasetLayout l = two_shards(by_size);
+    {
+      DatasetWriter alone({folder / "set"}, l);
+      for (std::int64_t episode = 0; episode < 80; episode += 16) write_block(alone, l, episode);
+    }
+    const DatasetFiles files = find_dataset(folder / "set");
+    check_complete(files);
+    EXPECT_THAT(examine_dataset(files).problems, IsEmpty());
+    fs::copy_file(folder / "set/shard-00000.h5", folder / "set/shard-00001.h5",
+                  fs::copy_options::overwrite_existing);
+    const char* const message = by_size ? "holds episodes 0 to 47; expected 48 to 79"
+                                        : "holds episodes 0 to 31; expected 32 to 79";
+    EXPECT_THAT(examine_dataset(files).problems,
+                ElementsAre(AllOf(HasSubstr("shard-00001.h5: "), HasSubstr(message))));
+    try {
+      check_complete(files);
+      FAIL() << "episodes are missing";
+    } catch (const IoError& error) {
+      EXPECT_THAT(error.what(), AllOf(HasSubstr("shard-00001.h5' "), HasSubstr(message)));
+    }
   }
 }
 
