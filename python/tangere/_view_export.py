@@ -279,6 +279,7 @@ def _write(data: Path, path: Path, export: _Export, chosen: Sequence[int]) -> bo
                 demo[f"obs/{key}"], demo[f"final_obs/{key}"] = rows, rows[-1:]
                 stored += [] if key in stored else [key]
         scene.attrs["observations"] = stored
+        scene.create_group("sensors")
         for name, about in sensors.items():
             group = scene.create_group(f"sensors/{name}")
             group.attrs["pressure_sign"] = about["pressure_sign"]

@@ -164,6 +164,14 @@ def test_the_command_makes_the_page(pushes, command, tmp_path):
     assert sorted(p.name for p in tmp_path.iterdir()) == ["out", "page.html"]
 
 
+@pytest.mark.parametrize("to", ["lerobot", "zarr"])
+def test_a_scene_without_sensors_has_a_page(generate, tmp_path, to):
+    data = generate(str(tangere.scenes()["ten_boxes"]), "--episodes", "1", "--steps", "20")
+    exports.export(data, tmp_path / "out", to, privileged=True, workers=1)
+    shown = block(tangere.view(tmp_path / "out").html)
+    assert not shown["sensors"] and len(shown["episodes"]) == 1 and shown["shapes"]
+
+
 def test_what_has_no_scene_is_told(pushes, generate, command, tmp_path):
     exports.export(pushes, tmp_path / "out", "zarr")
     notes = tmp_path / "out/.zattrs"
