@@ -97,23 +97,33 @@ class Ftp1(ZarrStore):
         self.notes = [] if self._hand else [
             "FTP-1's loader reads the touch of a hand with joints alone; see --hand"
         ]  # fmt: skip
+        camera = self._camera_of(frames)
+        written = {camera, *self._groups.values(), *(["q"] if self._joints or self._hand else [])}
+        lost = [key for key in episodes.keys if key not in written]
+        if lost:
+            self.notes.append(f"left out, because FTP-1 has no place for it: {', '.join(lost)}")
         if self._joints:
             names = {"names": joints.split(",") if joints else []}
             columns[f"{side}_arm_joints"] = Column(
                 (len(self._joints),), np.dtype(np.float32), names
             )
         self._arm = f"{side}_arm_joints"
-        self._camera = next((
-            key for key in episodes.keys
-            if key.rpartition(".")[0] in episodes.cameras
-            and is_picture(frames.shapes[key], frames.types[key])
-        ), None)  # fmt: skip
+        self._camera = camera
         if self._camera:
             shape = frames.shapes[self._camera]
             columns["camera_main_rgb"] = Column(shape, np.dtype(np.uint8), {"key": self._camera})
         columns["action"] = Column(frames.shapes["actions"], np.dtype(np.float32), about["action"])
         columns["reward"] = Column((), np.dtype(np.float32), {})
         super().__init__(frames, columns)
+
+    @staticmethod
+    def _camera_of(frames: Frames) -> str | None:
+        """The first picture in colours of a camera."""
+        return next((
+            key for key in frames.episodes.keys
+            if key.rpartition(".")[0] in frames.episodes.cameras
+            and is_picture(frames.shapes[key], frames.types[key])
+        ), None)  # fmt: skip
 
     def job(self) -> dict[str, Any]:
         said = {"text": self._text, "sensor": self._sensor, "joints": self._joints,

@@ -75,10 +75,14 @@ class UniVtac:
         ]  # fmt: skip
         first = self._arrays(frames.of(0))
         self.names = sorted(first)
+        self._windows = sorted(key for key in episodes.windows if self._path(key))
         self.notes = [
             f"UniVTAC has one reading a frame: of the windows of {key} the newest one is written"
-            for key in episodes.windows
+            for key in self._windows
         ]
+        lost = [key for key in episodes.keys if key != "q" and not self._path(key)]
+        if lost:
+            self.notes.append(f"left out, because UniVTAC has no place for it: {', '.join(lost)}")
 
     def job(self) -> dict[str, Any]:
         return {
@@ -127,7 +131,7 @@ class UniVtac:
             **frames.scene_note(),
             "datasets": self.names,
             "units": {name: unit for name in self.names if (unit := self._unit(name))},
-            **({"newest_of_window": sorted(episodes.windows)} if episodes.windows else {}),
+            **({"newest_of_window": self._windows} if self._windows else {}),
             "episodes": [
                 {
                     "demo": episodes.names[i], "steps": int(length),
@@ -164,22 +168,35 @@ class UniVtac:
         if self._all:
             found["q"] = arrays["q"].astype(np.float32)
         for key in episodes.keys:
+            path = self._path(key)
             owner, _, reading = key.partition(".")
-            if is_picture(frames.shapes[key], frames.types[key]):
-                kind = "tactile" if owner in episodes.sensors else "observation"
-                found[f"{kind}/{owner}/{reading}"] = _jpeg_rows(picture_rows(arrays, key))
-            elif not self._is_of_sensor(key):
+            if not path:
                 continue
+            if is_picture(frames.shapes[key], frames.types[key]):
+                found[path] = _jpeg_rows(picture_rows(arrays, key))
             elif not reading:
-                found[f"tactile/{owner}/force"] = self._newest(arrays, key).astype(np.float32)
+                found[path] = self._newest(arrays, key).astype(np.float32)
             elif reading == "height":
-                depth = (1000 * self._newest(arrays, key)[..., 0]).astype(np.float32)
-                found[f"tactile/{owner}/press_depth"] = depth
-            elif reading == "markers" and owner in self._pixels:
-                found[f"tactile/{owner}/marker"] = marker_pixels(
+                found[path] = (1000 * self._newest(arrays, key)[..., 0]).astype(np.float32)
+            else:
+                found[path] = marker_pixels(
                     self._newest(arrays, key), episodes.sensors[owner], self._pixels[owner]
                 )
         return found
+
+    def _path(self, key: str) -> str:
+        """Where an observation is written; empty if it is left out."""
+        frames, episodes = self.frames, self.frames.episodes
+        owner, _, reading = key.partition(".")
+        if is_picture(frames.shapes[key], frames.types[key]):
+            return f"{'tactile' if owner in episodes.sensors else 'observation'}/{owner}/{reading}"
+        if not self._is_of_sensor(key):
+            return ""
+        if not reading:
+            return f"tactile/{owner}/force" if unit_and_meaning(episodes, key)[0] == "N" else ""
+        if reading == "height":
+            return f"tactile/{owner}/press_depth"
+        return f"tactile/{owner}/marker" if reading == "markers" and owner in self._pixels else ""
 
     def _newest(self, arrays: Arrays, key: str) -> np.ndarray:
         """The reading at each row."""

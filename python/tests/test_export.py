@@ -78,7 +78,8 @@ def test_zarr_has_every_number(pushes, tmp_path):
 def test_ftp1_has_its_tactile_keys(presses, tmp_path):
     options = {"joints": "hand.x,hand.z", "task": "press the gel", "sensor": "GelSightMini",
                "hand": "hand.y=6,hand.x=1"}  # fmt: skip
-    assert not exports.export(presses, tmp_path / "out", "ftp1", **options).notes
+    done = exports.export(presses, tmp_path / "out", "ftp1", **options)
+    assert done.notes == ["left out, because FTP-1 has no place for it: v"]
     data = zarr.open_group(str(tmp_path / "out/data"), mode="r")
     count = len(stored(presses, "actions"))
     field = data["right_tactile_data_gel"]
@@ -103,7 +104,10 @@ def test_ftp1_has_its_tactile_keys(presses, tmp_path):
 def test_ftp1_tells_pads_apart(generate, tmp_path):
     grasps = generate("stable_grasp", "--episodes", "2", "--seed", "3")
     done = exports.export(grasps, tmp_path / "out", "ftp1", side="left")
-    assert done.notes == ["FTP-1's loader reads the touch of a hand with joints alone; see --hand"]
+    assert done.notes == [
+        "FTP-1's loader reads the touch of a hand with joints alone; see --hand",
+        "left out, because FTP-1 has no place for it: q, v",
+    ]
     data = zarr.open_group(str(tmp_path / "out/data"), mode="r")
     flow = stored(grasps, "obs/flow")  # (n, 4, 13, 10): pad, component
     pads = data["left_tactile_data_flow"][:]

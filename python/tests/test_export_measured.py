@@ -126,7 +126,10 @@ def test_a_task_declares_what_it_shows(pushes, generate, tmp_path):
     done = export(pushes, tmp_path / "out", "zarr")
     assert "q" not in dict(zarr.open_group(str(tmp_path / "out"), mode="r")["data"].arrays())
     assert "because a robot could not measure them: q, v; --privileged" in done.notes[0]
-    export(generate("stable_grasp", "--episodes", "2"), tmp_path / "uv", "univtac")
-    joints = json.loads((tmp_path / "uv/metadata.json").read_text())["joints"]
+    done = export(generate("stable_grasp", "--episodes", "2"), tmp_path / "uv", "univtac")
+    said = json.loads((tmp_path / "uv/metadata.json").read_text())
+    assert "tactile/flow/force" not in said["datasets"]  # its unit is 1, no force
+    assert "left out, because UniVTAC has no place for it: v, flow" in done.notes
+    joints = said["joints"]
     hand = ["hand_slide.x", "hand_slide.y", "hand_slide.z", "hand_turn.angle"]
     assert joints == hand + ["left_finger.position", "right_finger.position"]  # not of the bar

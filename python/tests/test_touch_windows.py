@@ -85,11 +85,13 @@ def test_univtac_has_the_newest_reading_and_says_so(pushes_with_touch, tmp_path)
     pytest.importorskip("PIL.Image", reason="pillow is not installed")
     done = exports.export(pushes_with_touch, tmp_path / "out", "univtac")
     assert done.notes[0].startswith("UniVTAC has one reading a frame: of the windows of pad ")
+    assert not any("windows of pad.sum" in note for note in done.notes)
+    assert any(note.startswith("left out") and "pad.sum" in note for note in done.notes)
     with h5py.File(tmp_path / "out/hdf5/0.hdf5") as file:
         wanted = Episodes(pushes_with_touch)[0]["pad"][:, -1]
         np.testing.assert_array_equal(file["tactile/pad/force"], wanted)
     said = json.loads((tmp_path / "out/metadata.json").read_text())
-    assert said["newest_of_window"] == ["pad", "pad.sum"]
+    assert said["newest_of_window"] == ["pad"]
 
 
 def test_windows_of_rows_with_windows_are_joined(generate, tmp_path):
