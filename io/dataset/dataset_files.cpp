@@ -116,11 +116,11 @@ std::vector<HeldEpisodes> held_episodes(const DatasetFiles& dataset) {
 /// File and message of shards that hold other episodes than their numbers say. Episodes are shared
 /// out by the number of shards or by their size, so the way that more files agree with counts.
 std::vector<std::pair<std::string, std::string>> misplaced_episodes(const DatasetFiles& dataset) {
-  DatasetLayout by_number;
-  by_number.episodes = count_in(dataset.settings, "dataset_episodes");
-  by_number.shards = count_in(dataset.settings, "dataset_shards");
-  if (dataset.folder.empty() || by_number.shards < 1 || by_number.episodes < 1 ||
-      by_number.episodes > kMostCounted)
+  DatasetLayout layout;
+  layout.episodes = count_in(dataset.settings, "dataset_episodes");
+  layout.shards = count_in(dataset.settings, "dataset_shards");
+  if (dataset.folder.empty() || layout.shards < 1 || layout.episodes < 1 ||
+      layout.episodes > kMostCounted)
     return {};
   std::int64_t most = 0;
   const std::vector<HeldEpisodes> held = held_episodes(dataset);
@@ -128,7 +128,7 @@ std::vector<std::pair<std::string, std::string>> misplaced_episodes(const Datase
   const auto compare = [&](const auto& range_of) {
     std::vector<std::pair<std::string, std::string>> found;
     for (const HeldEpisodes& one : held) {
-      if (one.shard < 0 || one.shard >= by_number.shards) continue;
+      if (one.shard < 0 || one.shard >= layout.shards) continue;
       const EpisodeRange expected = range_of(one.shard);
       if (one.there.first != expected.first || one.there.end != expected.end)
         found.emplace_back(
@@ -137,13 +137,13 @@ std::vector<std::pair<std::string, std::string>> misplaced_episodes(const Datase
     }
     return found;
   };
-  auto found = compare([&](std::int64_t shard) { return by_number.shard_episodes(shard); });
-  const std::int64_t all = by_number.episodes;
-  if (found.empty() || most < 1 || (all - 1) / most + 1 != by_number.shards) return found;
-  auto by_size = compare([&](std::int64_t shard) {
+  auto found = compare([&](std::int64_t shard) { return layout.shard_episodes(shard); });
+  const std::int64_t all = layout.episodes;
+  if (found.empty() || most < 1 || (all - 1) / most + 1 != layout.shards) return found;
+  auto unequal = compare([&](std::int64_t shard) {
     return EpisodeRange{shard * most, std::min(all, (shard + 1) * most)};
   });
-  return by_size.size() <= found.size() ? by_size : found;
+  return unequal.size() <= found.size() ? unequal : found;
 }
 
 /// Compares the settings of a file with those of the data set. Damage counts as a difference.
