@@ -63,3 +63,14 @@ def spoil():
 def pushes(generate) -> Path:
     """Twenty scripted episodes of box pushing."""
     return generate("box_pushing", "--episodes", "20", "--seed", "5")
+
+
+@pytest.fixture(scope="session")
+def sets(pushes, tmp_path_factory) -> dict[str, Path]:
+    """FORMAT → an export of 20 episodes of box pushing, which no test changes."""
+    exports = pytest.importorskip("tangere.export")
+    folder = tmp_path_factory.mktemp("exports")
+    out = {to: folder / f"out.{to}" for to in ("lerobot", "zarr", "ftp1", "univtac", "csv")}
+    for to, path in out.items():
+        exports.export(pushes, path, to, **({} if to == "csv" else {"workers": 1}))
+    return out

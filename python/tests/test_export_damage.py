@@ -147,16 +147,6 @@ def test_reading_a_damaged_shard_names_it(damaged):
         Episodes(damaged(shorten))
 
 
-@pytest.fixture(scope="module")
-def sets(pushes, tmp_path_factory):
-    """FORMAT → an export of 20 episodes of box pushing."""
-    folder = tmp_path_factory.mktemp("exports")
-    for to in FORMATS:
-        alone = {} if to == "csv" else {"workers": 1}
-        exports.export(pushes, folder / f"out.{to}", to, **alone)
-    return {to: folder / f"out.{to}" for to in FORMATS}
-
-
 PARQUET, EPISODES = "data/chunk-000/file-000.parquet", "meta/episodes/chunk-000/file-000.parquet"
 CHUNK = "data/tactile/0.0.0.0"
 GROUP = "data/right_tactile_data_tactile/0.0.0.0.0"

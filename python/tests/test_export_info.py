@@ -9,23 +9,11 @@ import subprocess
 
 import pytest
 
-from tangere import export as exports
-
 pytest.importorskip("pyarrow", reason="pyarrow is not installed")
 pytest.importorskip("zarr", reason="zarr is not installed")
 pytest.importorskip("PIL.Image", reason="pillow is not installed")
 
 FORMATS = ["lerobot", "zarr", "ftp1", "univtac", "csv"]
-
-
-@pytest.fixture(scope="module")
-def sets(pushes, tmp_path_factory):
-    """FORMAT → an export of 20 episodes of box pushing."""
-    folder = tmp_path_factory.mktemp("exports")
-    for to in FORMATS:
-        alone = {} if to == "csv" else {"workers": 1}
-        exports.export(pushes, folder / f"out.{to}", to, **alone)
-    return {to: folder / f"out.{to}" for to in FORMATS}
 
 
 @pytest.fixture
