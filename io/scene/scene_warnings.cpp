@@ -20,7 +20,8 @@
 namespace tangere {
 namespace {
 
-constexpr double kBelow = 0.1;  // share of a body's thickness
+constexpr double kBelow = 0.1;   // share of a body's thickness
+constexpr double kClose = 0.01;  // share of its width: so far off its surface points may be
 
 std::string listed(const std::set<std::string>& names) {
   std::string text;
@@ -138,12 +139,13 @@ class SensorWarnings {
           fmt::format("lies at least {:.3g} m off that body, which is {:.3g} m across; expected "
                       "points on its surface, in the body's frame and the scene's unit",
                       least, wide));
-    if (most > 0) warn_of_points_beside();
+    if (most > kClose * wide) warn_of_points_beside(kClose * wide);
   }
 
   /// Bodies do not stop at points beside or above what moves rigidly with the sensor's body, so
-  /// such points read forces that nothing exerts. Half the distance between points is allowed.
-  void warn_of_points_beside() {
+  /// such points read forces that nothing exerts. Half the distance between points is allowed, and
+  /// `close` [m] at least.
+  void warn_of_points_beside(double close) {
     if (is_the_contact()) return;
     struct Part {
       const Shape& shape;
@@ -159,7 +161,7 @@ class SensorWarnings {
       if (link.body.name == sensor_.body) own = parts.back().in_group;
     }
     const std::vector<TactilePoint> points = tactile_points(sensor_);
-    const double allowed = 0.5 * spacing(points);
+    const double allowed = std::max(close, 0.5 * spacing(points));
     std::size_t beside = 0;
     double most = 0;
     for (const TactilePoint& p : points) {

@@ -20,7 +20,7 @@ struct Grasp {
   std::string contact =
       "<general_primitive_contact general_body=\"object\" primitive_body=\"finger\" kn=\"100\"/>";
   std::string corner0 = "-0.008 -0.008 0.01", corner1 = "0.008 0.008 0.01";
-  std::string kn = "20";
+  std::string kn = "20", resolution = "5 5";
 
   [[nodiscard]] std::vector<std::string> warnings() const {
     const auto body = [](const std::string& name, const std::string& shape, const char* at,
@@ -37,8 +37,8 @@ struct Grasp {
                            "</contact>\n<sensor><tactile name=\"skin\" body=\"finger\" "
                            "type=\"rect_array\" rect_pos0=\"" +
                            corner0 + "\" rect_pos1=\"" + corner1 +
-                           "\" axis0=\"1 0 0\" axis1=\"0 1 0\" resolution=\"5 5\" kn=\"" + kn +
-                           "\"/></sensor></tangere>",
+                           "\" axis0=\"1 0 0\" axis1=\"0 1 0\" resolution=\"" + resolution +
+                           "\" kn=\"" + kn + "\"/></sensor></tangere>",
                        "s.xml")
         .warnings;
   }
@@ -93,6 +93,12 @@ TEST(SceneWarnings, PointsBesideTheFaceAreTold) {
   EXPECT_THAT(g.warnings(),
               ElementsAre(HasSubstr("has 10 of 25 points up to 0.004 m off that body and what is "
                                     "rigidly joined to it")));
+  Grasp one;  // a single point has no distance to another
+  one.corner0 = one.corner1 = "0.003 0 0.0100001";
+  one.resolution = "1 1";
+  EXPECT_THAT(one.warnings(), IsEmpty());
+  one.corner0 = one.corner1 = "0.003 0 0.011";
+  EXPECT_THAT(one.warnings(), ElementsAre(HasSubstr("1 of 1 points up to 0.001 m off")));
   const auto with_part = [&](const char* joint) {
     g.inside_finger = std::string("<link name=\"rim\"><joint name=\"rim\" type=\"") + joint +
                       "\" pos=\"0 0 0.009\" quat=\"0.7071067811865476 0 0 0.7071067811865476\"/>"
