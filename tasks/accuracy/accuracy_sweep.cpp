@@ -28,9 +28,7 @@ constexpr std::array kTolerances = {1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e
 constexpr int kPasses = 3;
 constexpr double kEnoughSeconds = 0.3;  // of CPU time, after which a pass is not repeated
 constexpr double kBlur = 10, kFineEnough = 40;
-/// Confirmation runs: least speedup over the best confirmed setting, and largest count.
-constexpr double kWorthRepeating = 1.1;
-constexpr int kMostRepeats = 3;
+constexpr int kMostRepeats = 3;  // confirmation runs
 
 /// Share of the errors that are 0.3 to 3 times `requested`. NaN entries do not count.
 double share_near(double requested, const std::vector<double>& errors) {
@@ -286,7 +284,7 @@ class Sweep {
       double fastest = 0;
       for (const AccuracyPoint& p : std::span(report_.points).subspan(i, precisions()))
         if (meets_target(p.error) && !meets_target(p.bound)) fastest = std::max(fastest, p.rate);
-      if (fastest > kWorthRepeating * sure) ranked.emplace_back(fastest, i);
+      if (fastest > options_.worth_repeating * sure) ranked.emplace_back(fastest, i);
     }
     std::ranges::sort(ranked, std::greater<>());
     for (const auto& [rate, i] : ranked) found.push_back(i);

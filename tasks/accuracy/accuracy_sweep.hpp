@@ -19,6 +19,9 @@ struct AccuracyOptions {
   double target = 1e-2;             ///< relative error
   std::optional<double> tolerance;  ///< of all settings; none: the one that follows the step
   int threads = 1;
+  /// A setting whose error meets the target but whose bound does not is run again if its rate is
+  /// more than this multiple of the best rate whose bound does.
+  double worth_repeating = 1.1;
 };
 
 /// One setting in one precision.
@@ -98,8 +101,8 @@ struct AccuracyListener {
 using FreshEpisodes = std::function<std::optional<FixedEpisodes>()>;
 
 /// A requested stop returns the points measured so far. At most three settings whose error meets
-/// the target but whose bound does not, and that are faster than all whose bound does, are run
-/// again on `fresh` episodes; their errors are then over all environments. Throws InputError if
+/// the target but whose bound does not, the fastest first, are run again on `fresh` episodes
+/// (worth_repeating); their errors are then over all environments. Throws InputError if
 /// nothing touches in any environment, or nothing moves.
 AccuracyReport accuracy_sweep(const FixedEpisodes& episodes, const AccuracyOptions& options,
                               const AccuracyListener& listener, const FreshEpisodes& fresh = {});
