@@ -49,16 +49,16 @@ TEST(Scripted, MovesTheBoxIntoTheHole) { expect_solved("insertion_translation", 
 TEST(Scripted, InsertsTheBox) { expect_solved("insertion", 0.81); }
 TEST(Scripted, OpensTheCap) { expect_solved("cap_opening_blind", 0.969, 0, 2); }
 TEST(Scripted, PushesTheBox) { expect_solved("box_pushing_privileged", 0.763, 1); }
-TEST(Scripted, TurnsTheEgg) { expect_solved("in_hand", 0.972, 0, 2); }
+TEST(Scripted, TurnsTheEgg) { expect_solved("in_hand", 0.972, 0, 5); }
 
 // Friction that remembers.
-TEST(Scripted, GraspsTheBarElastically) { expect_solved("stable_grasp_elastic", 0.993, 0, 2); }
+TEST(Scripted, GraspsTheBarElastically) { expect_solved("stable_grasp_elastic", 0.993, 0, 5); }
 TEST(Scripted, InsertsTheBoxElastically) { expect_solved("insertion_elastic", 0.789, 0, 2); }
 TEST(Scripted, OpensTheCapElastically) { expect_solved("cap_opening_elastic", 1, 0, 4); }
 TEST(Scripted, PushesTheBoxElastically) { expect_solved("box_pushing_elastic", 0.828, 1, 2); }
 
 // Gels that are the contact.
-TEST(Scripted, GraspsTheBarWithGels) { expect_rate(*task_named("stable_grasp_gel"), 0.961, 0, 20); }
+TEST(Scripted, GraspsTheBarWithGels) { expect_rate(*task_named("stable_grasp_gel"), 0.961, 0, 40); }
 
 }  // namespace
 }  // namespace tangere
