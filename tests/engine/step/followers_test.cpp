@@ -6,6 +6,7 @@
 #include <cmath>
 #include <tuple>
 
+#include "tests/engine/effect_properties.hpp"
 #include "tests/engine/gradient_differences.hpp"
 #include "tests/engine/gradient_tangent.hpp"
 #include "tests/engine/random_followers.hpp"
@@ -216,14 +217,7 @@ TEST(Tendon, SwingsByClosedForm) {
 
 TEST(FollowersFaults, SayWhatWasExpected) {
   const auto fault = [](const auto& change) {
-    Scene s = two_rails();
-    change(s);
-    try {
-      const Model model(s);
-    } catch (const InputError& e) {
-      return std::string(e.what());
-    }
-    return std::string();
+    return testing::fault_of_model(two_rails(), change);
   };
   EXPECT_NE(fault([](Scene& s) { s.links[1].joint.follows = {"third"}; }).find("third"),
             std::string::npos);

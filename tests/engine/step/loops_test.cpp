@@ -5,8 +5,8 @@
 
 #include <cmath>
 
-#include "engine/sense/energy_balance.hpp"
 #include "engine/sense/loop_readings.hpp"
+#include "tests/engine/effect_properties.hpp"
 #include "tests/engine/gradient_differences.hpp"
 #include "tests/engine/gradient_tangent.hpp"
 #include "tests/engine/random_machine.hpp"
@@ -204,20 +204,9 @@ TEST(Loops, BalanceTheirEnergy) {
   scene.loops[0].stiffness = 1e4;
   scene.loops[0].damping = 30;
   const Model model(scene);
-  Batch batch(model, 1);
-  Stepper stepper(model, testing::options(Integrator::sdirk3, 5e-4));
-  EnergyBalanceReader reader(model);
-  EnergyBalance before = reader.read(batch, 0, {});
-  const double start = before.energy();
-  double taken = 0;
-  for (int t = 0; t < 400; ++t) {
-    stepper.step(batch, {});
-    const EnergyBalance now = reader.read(batch, 0, {});
-    taken += between(before, now, 5e-4).dissipated;
-    before = now;
-  }
-  EXPECT_GT(taken, 1e-7);
-  EXPECT_NEAR(start - before.energy(), taken, 2e-3 * taken);
+  const testing::EnergyLoss energy = testing::energy_loss(model);
+  EXPECT_GT(energy.taken, 1e-7);
+  EXPECT_NEAR(energy.lost, energy.taken, 2e-3 * energy.taken);
 }
 
 TEST(Loops, HaveTheSameBitsAloneAndInABatch) {
@@ -228,26 +217,7 @@ TEST(Loops, HaveTheSameBitsAloneAndInABatch) {
                                   {}});
   ASSERT_GE(scene.loops.size(), 2U);
   const Model model(scene);
-  constexpr int kMany = 19;
-  Batch batch(model, kMany, 3);
-  Stepper stepper(model, testing::options(Integrator::bdf2, 2e-3));
-  const testing::RunInput in = testing::random_input(model, 4, 40);
-  for (int e = 0; e < kMany; ++e) batch.set_state(e, in.q, in.v);
-  for (const auto& u : in.u) testing::step_all(stepper, batch, u);
-  EXPECT_NE(testing::q_of(batch, 0), testing::q_of(batch, 1)) << "the stiffness varies";
-  for (const int e : {0, 7, 18}) {
-    Batch alone(model, kMany, 3);
-    Stepper one(model, testing::options(Integrator::bdf2, 2e-3));
-    alone.set_state(e, in.q, in.v);
-    std::vector<double> zeros(std::size_t(model.nu() * kMany));
-    for (const auto& u : in.u) {
-      std::fill(zeros.begin(), zeros.end(), 0.0);
-      std::copy(u.begin(), u.end(), zeros.begin() + e * model.nu());
-      one.step(alone, zeros);
-    }
-    EXPECT_EQ(testing::q_of(batch, e), testing::q_of(alone, e)) << e;
-    EXPECT_EQ(testing::v_of(batch, e), testing::v_of(alone, e)) << e;
-  }
+  testing::expect_bits_of_lone_environments(model, 4);
 }
 
 /// Boxes on the ground, the first two held together by a weld: they sleep and wake as one.
@@ -313,14 +283,7 @@ INSTANTIATE_TEST_SUITE_P(Schemes, LoopsBySchemes,
 
 TEST(LoopFaults, SayWhatWasExpected) {
   const auto fault = [](const auto& change) {
-    Scene s = parallelogram(0);
-    change(s);
-    try {
-      const Model model(s);
-    } catch (const InputError& e) {
-      return std::string(e.what());
-    }
-    return std::string();
+    return testing::fault_of_model(parallelogram(0), change);
   };
   const auto has = [](const std::string& text, const char* part) {
     EXPECT_NE(text.find(part), std::string::npos) << text;

@@ -9,6 +9,7 @@
 #include "engine/scene/scene_number.hpp"
 #include "engine/scene/schema.hpp"
 #include "engine/step/rotation_log.hpp"
+#include "tests/engine/effect_properties.hpp"
 #include "tests/engine/runs.hpp"
 #include "tests/engine/scenes.hpp"
 
@@ -259,14 +260,7 @@ TEST(Motors, AServoOfVelocityIsClippedAsAWhole) {
 
 TEST(Motors, FaultsOfServosSayWhatWasExpected) {
   const auto fault = [](const auto& change) {
-    Scene s = lift({"car_joint", -1, 1, {}});
-    change(s);
-    try {
-      const Model model(s);
-    } catch (const InputError& e) {
-      return std::string(e.what());
-    }
-    return std::string();
+    return testing::fault_of_model(lift({"car_joint", -1, 1, {}}), change);
   };
   EXPECT_NE(fault([](Scene& s) { s.motors[0].D = 2; }).find("needs 'scale'"), std::string::npos);
   EXPECT_NE(fault([](Scene& s) {
