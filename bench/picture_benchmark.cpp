@@ -69,6 +69,19 @@ void picture_bytes(benchmark::State& state, double noise) {
 void BM_Picture(benchmark::State& state) { picture_bytes(state, 0); }
 void BM_NoisyPicture(benchmark::State& state) { picture_bytes(state, 1.5); }
 
+/// Colours before they are rounded, which gradients take.
+template <class T>
+void BM_PictureNumbers(benchmark::State& state) {
+  Press<T> press(state);
+  std::vector<T> colours(press.numbers());
+  for (auto _ : state) {
+    press.camera.set_depth(press.depth);
+    press.camera.read(false, std::span<T>(colours));
+    benchmark::DoNotOptimize(colours.data());
+  }
+  state.SetItemsProcessed(state.iterations());
+}
+
 template <class T>
 void BM_PicturePullback(benchmark::State& state) {
   Press<T> press(state);
@@ -161,6 +174,8 @@ void BM_Camera(benchmark::State& state) {
 BENCHMARK(BM_Camera)->Arg(64)->Arg(84)->Arg(128)->Arg(224)->Unit(benchmark::kMicrosecond);
 BENCHMARK(BM_Picture)->Apply(sizes);
 BENCHMARK(BM_NoisyPicture)->Apply(sizes);
+BENCHMARK(BM_PictureNumbers<float>)->Apply(sizes);
+BENCHMARK(BM_PictureNumbers<double>)->Apply(sizes);
 BENCHMARK(BM_PicturePullback<float>)->Apply(sizes);
 BENCHMARK(BM_PicturePullback<double>)->Apply(sizes);
 

@@ -81,6 +81,7 @@ GelCamera<T>::GelCamera(const PictureGrid& grid, const PictureDescription& pictu
       surface_(depth_.size()),
       p_(static_cast<std::size_t>(grid.width)),
       q_(p_.size()),
+      up_(p_.size()),
       planes_(kColours * p_.size()),
       p_bar_(p_.size()),
       q_bar_(p_.size()),
@@ -120,16 +121,16 @@ void GelCamera<T>::read_height(std::span<T> height) {
 }
 
 template <class T>
-void GelCamera<T>::shade(int row, std::span<T> up) {
+void GelCamera<T>::shade(int row) {
   if (image_.is_flat(row)) {
     std::fill(p_.begin(), p_.end(), T(0));
     std::fill(q_.begin(), q_.end(), T(0));
-    std::fill(up.begin(), up.end(), T(1));
+    std::fill(up_.begin(), up_.end(), T(1));
     const std::span<const T> flat = colour_.background(row);
     std::copy(flat.begin(), flat.end(), planes_.begin());
   } else {
     image_.read_slopes(row, p_, q_);
-    colour_.shade(row, p_, q_, planes_, up);
+    colour_.shade(row, p_, q_, planes_, up_);
   }
 }
 
@@ -143,8 +144,8 @@ void GelCamera<T>::add_draws(int row) {
 }
 
 template <class T>
-void GelCamera<T>::paint(int row, bool markers, std::span<T> up) {
-  shade(row, up);
+void GelCamera<T>::paint(int row, bool markers) {
+  shade(row);
   if (markers) markers_->darken(row, planes_);
   add_draws(row);
 }
@@ -197,11 +198,11 @@ void GelCamera<T>::pull_back(bool markers, std::span<const T> height_bar,
 template <class T>
 void GelCamera<T>::pull_back_colours(bool markers, std::span<const T> colour_bar, bool move) {
   const std::size_t width = p_.size();
-  std::vector<T> planes_bar(planes_.size()), up(width), shaded, levels_bar(width);
+  std::vector<T> planes_bar(planes_.size()), shaded, levels_bar(width);
   image_.begin_pull_back();
   if (move) markers_->begin_pull_back();
   for (int row = 0; row < grid_.height; ++row) {
-    shade(row, up);
+    shade(row);
     if (move) shaded = planes_;
     if (markers) markers_->darken(row, planes_);
     add_draws(row);
@@ -218,7 +219,7 @@ void GelCamera<T>::pull_back_colours(bool markers, std::span<const T> colour_bar
       }
       markers_->add_row(row, levels_bar);
     }
-    colour_.pull_back(row, p_, q_, up, planes_bar, p_bar_, q_bar_);
+    colour_.pull_back(row, p_, q_, up_, planes_bar, p_bar_, q_bar_);
     image_.add_slopes(row, p_bar_, q_bar_);
   }
 }

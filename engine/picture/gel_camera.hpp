@@ -54,10 +54,10 @@ class GelCamera {
   void pull_back_depth(std::span<const T> surface_bar, std::span<T> depth_bar);
 
  private:
-  /// Fills planes_ with a row of the picture, not clamped yet. `up`: as of GelColour::shade().
-  void paint(int row, bool markers, std::span<T> up = {});
-  /// Fills planes_ with the colours of a row of the gel.
-  void shade(int row, std::span<T> up);
+  /// Fills planes_ with a row of the picture, not clamped yet.
+  void paint(int row, bool markers);
+  /// Fills p_, q_, up_ and planes_ with slopes, normals and colours of a row of the gel.
+  void shade(int row);
   /// Multiplies planes_ by the gains and adds noise.
   void add_draws(int row);
   void pull_back_colours(bool markers, std::span<const T> colour_bar, bool move);
@@ -70,9 +70,9 @@ class GelCamera {
   std::optional<PrintedMarkers<T>> markers_;
   std::optional<CameraKey> key_;
   std::array<T, kColours> gains_{1, 1, 1};
-  std::vector<T> depth_, surface_;                 // (points)
-  std::vector<T> p_, q_, planes_, p_bar_, q_bar_;  // of a row
-  std::vector<std::uint8_t> bytes_;                // (3, width)
+  std::vector<T> depth_, surface_;                      // (points)
+  std::vector<T> p_, q_, up_, planes_, p_bar_, q_bar_;  // of a row
+  std::vector<std::uint8_t> bytes_;                     // (3, width)
 };
 
 /// Returns the part of a picture's description that its grid has. `rows`, `cols`: points; pitches

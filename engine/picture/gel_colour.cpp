@@ -26,24 +26,26 @@ void average_line(const float* given, std::ptrdiff_t step, int from, T* out,
 template <class T>
 struct RowLoop {
   const T *p, *q, *x, *background;
-  T *planes, *up;  // up: N of the normals, where it is kept
+  T *planes, *up;  // up: N of the normals
   std::size_t width;
   const std::array<std::array<T, kShades>, kColours>*level, *tilt;
 };
 
-template <bool kKeep, class T>
+/// The root and the quotient of a normal take most of a pixel's time, so the channels share them.
+template <class T>
 [[gnu::always_inline]] inline void shade_pixels(const RowLoop<T>& row) {
+  const T *const p = row.p, *const q = row.q, *const x = row.x;
   T* const up = row.up;
+#pragma GCC ivdep
+  for (std::size_t i = 0; i < row.width; ++i)
+    up[i] = T(1) / std::sqrt(T(1) + (p[i] * p[i] + q[i] * q[i]));
   for (std::size_t c = 0; c < kColours; ++c) {
-    const T *const p = row.p, *const q = row.q, *const x = row.x;
     const T* const background = row.background + c * row.width;
     T* const plane = row.planes + c * row.width;
     const auto a = (*row.level)[c], b = (*row.tilt)[c];
 #pragma GCC ivdep
     for (std::size_t i = 0; i < row.width; ++i) {
-      const T z = T(1) / std::sqrt(T(1) + (p[i] * p[i] + q[i] * q[i]));
-      if constexpr (kKeep) up[i] = z;
-      const T u = -p[i] * z, v = -q[i] * z, w = z - T(1);
+      const T z = up[i], u = -p[i] * z, v = -q[i] * z, w = z - T(1);
       const T xx = u * u, xy = u * v, yy = v * v, xz = u * z, yz = v * z;
       const T level = ((a[0] * u + a[1] * v) + (a[2] * w + a[3] * xx)) +
                       ((a[4] * xy + a[5] * yy) + (a[6] * xz + a[7] * yz));
@@ -85,10 +87,8 @@ template <class T>
 
 TANGERE_CLONES void pull_back_row(const RowPullback<float>& row) { pull_back_pixels(row); }
 TANGERE_CLONES void pull_back_row(const RowPullback<double>& row) { pull_back_pixels(row); }
-TANGERE_CLONES void shade_row(const RowLoop<float>& row) { shade_pixels<false>(row); }
-TANGERE_CLONES void shade_row(const RowLoop<double>& row) { shade_pixels<false>(row); }
-TANGERE_CLONES void shade_and_keep(const RowLoop<float>& row) { shade_pixels<true>(row); }
-TANGERE_CLONES void shade_and_keep(const RowLoop<double>& row) { shade_pixels<true>(row); }
+TANGERE_CLONES void shade_row(const RowLoop<float>& row) { shade_pixels(row); }
+TANGERE_CLONES void shade_row(const RowLoop<double>& row) { shade_pixels(row); }
 
 }  // namespace
 
@@ -141,10 +141,8 @@ template <class T>
 void GelColour<T>::shade(int row, std::span<const T> p, std::span<const T> q, std::span<T> planes,
                          std::span<T> up) const {
   const Row of = row_of(row);
-  const RowLoop<T> loop{p.data(),      q.data(),  x_.data(), background(row).data(),
-                        planes.data(), up.data(), p.size(),  &of.level,
-                        &of.tilt};
-  up.empty() ? shade_row(loop) : shade_and_keep(loop);
+  shade_row({p.data(), q.data(), x_.data(), background(row).data(), planes.data(), up.data(),
+             p.size(), &of.level, &of.tilt});
 }
 
 template <class T>

@@ -30,10 +30,10 @@ class GelColour {
 
   /// Returns the background of a row, (3, width): R of all pixels, then G, then B.
   [[nodiscard]] std::span<const T> background(int row) const;
-  /// Computes the colours of a row, (3, width), not clamped, from its slopes, (width) each. `up`:
-  /// N of its normals, (width), for pull_back(); empty: not needed.
+  /// Computes the colours of a row, (3, width), not clamped, from its slopes, and `up`, N of its
+  /// normals, (width) each.
   void shade(int row, std::span<const T> p, std::span<const T> q, std::span<T> planes,
-             std::span<T> up = {}) const;
+             std::span<T> up) const;
   /// Computes the cotangents of the slopes of a row from those of its colours, (3, width). `up`: as
   /// shade() gave it.
   void pull_back(int row, std::span<const T> p, std::span<const T> q, std::span<const T> up,

@@ -17,6 +17,16 @@ int sweeps_for(double reach) {
   return std::clamp(static_cast<int>(std::ceil(10 * reach)), kFewest, kMost);
 }
 
+/// Sweeps after which errors of a linear solve, which fall as n (ω - 1)^n, are those of rounding.
+template <class T>
+int spread_sweeps(double omega) {
+  if (!(omega > 1)) return 1;
+  const double least = std::log(std::numeric_limits<T>::epsilon()), rate = std::log(omega - 1);
+  int n = 1;
+  while (std::log(n) + n * rate > least) ++n;
+  return n;
+}
+
 /// Points of one colour of a row, and what is beside them.
 template <class T>
 struct HalfRow {
@@ -133,7 +143,8 @@ void Membrane<T>::pull_back(std::span<const T> depth, std::span<const T> height,
     }
   std::fill(value_.begin(), value_.end(), T(0));
   if (scale < T(1))
-    for (int n = 0; n < 3 * sweeps_; ++n) sweep([](const HalfRow<T>& row) { spread_row(row); });
+    for (int n = spread_sweeps<T>(omega_); n > 0; --n)
+      sweep([](const HalfRow<T>& row) { spread_row(row); });
   for (int i = 0; i < rows_; ++i)
     for (int j = 0; j < cols_; ++j) {
       const auto k = static_cast<std::size_t>(i * cols_ + j);

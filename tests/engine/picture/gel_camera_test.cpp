@@ -204,9 +204,9 @@ TEST(GelCamera, IsLinearInItsLamps) {
       for (double& number : shade) number *= 2;
   GelColour<double> one(gel, 12, 16), two(twice, 12, 16);
   testing::Random random(5);
-  Numbers p(16), q(16), a(48), b(48);
+  Numbers p(16), q(16), up(16), a(48), b(48);
   for (std::size_t k = 0; k < 16; ++k) p[k] = random.uniform(-1, 1), q[k] = random.uniform(-1, 1);
-  one.shade(3, p, q, a), two.shade(3, p, q, b);
+  one.shade(3, p, q, a, up), two.shade(3, p, q, b, up);
   const auto background = one.background(3);
   for (std::size_t k = 0; k < 48; ++k)
     EXPECT_NEAR(b[k] - background[k], 2 * (a[k] - background[k]), 1e-6);

@@ -3,6 +3,7 @@
 #include "engine/picture/membrane.hpp"
 
 #include <gtest/gtest.h>
+#include <Eigen/LU>
 
 #include <algorithm>
 #include <cmath>
@@ -126,6 +127,49 @@ TEST_P(MembranePullback, IsThatOfDifferences) {
     EXPECT_NEAR(depth_bar[k], (loss(more) - loss(less)) / (2 * step), 1e-5 * largest) << k;
   }
   EXPECT_GT(contacts, 20);
+}
+
+/// λ solves (1 + 2 (ℓx² + ℓy²)) λ - ℓx² Σ beside - ℓy² Σ above and below = cotangent where the
+/// membrane is free, and is 0 elsewhere. Sweeps are as many as its rounding needs, at any reach.
+TEST(Membrane, PullsBackToTheRoundingOfADenseSolve) {
+  const Grid grid{11, 12};
+  const Numbers depth =
+      on(grid, [&](double x, double y) { return round_depth(std::hypot(x, y), 2e-5); });
+  const auto n = Eigen::Index(grid.size());
+  testing::Random random(3);
+  Numbers weights(grid.size()), height(grid.size()), found(grid.size());
+  for (double& w : weights) w = random.uniform(-1, 1);
+  for (const double reach : {0.2, 0.7, 2.0, 6.0, 25.0}) {
+    SCOPED_TRACE(reach);
+    const double x = reach * reach, y = 0.64 * x;
+    Membrane<double> membrane(grid.rows, grid.cols, reach, 0.8 * reach);
+    membrane.settle(depth, height);
+    membrane.pull_back(depth, height, weights, found);
+    Eigen::MatrixXd A = Eigen::MatrixXd::Zero(n, n), beside = A;
+    Eigen::VectorXd right = Eigen::Map<const Eigen::VectorXd>(weights.data(), n);
+    for (int i = 0; i < grid.rows; ++i)
+      for (int j = 0; j < grid.cols; ++j) {
+        const int k = i * grid.cols + j;
+        if (j > 0) beside(k, k - 1) = x;
+        if (j + 1 < grid.cols) beside(k, k + 1) = x;
+        if (i > 0) beside(k, k - grid.cols) = y;
+        if (i + 1 < grid.rows) beside(k, k + grid.cols) = y;
+      }
+    const auto held = [&](Eigen::Index k) { return height[k] == depth[k] && depth[k] > 0; };
+    A = -beside;
+    A.diagonal().array() += 1 + 2 * (x + y);
+    for (Eigen::Index k = 0; k < n; ++k)
+      if (held(k)) A.row(k).setZero(), A(k, k) = 1, right[k] = 0;
+    int held_points = 0;
+    const Eigen::VectorXd pulled = beside * A.partialPivLu().solve(right);
+    for (Eigen::Index k = 0; k < n; ++k) {
+      held_points += held(k) ? 1 : 0;
+      const double expected = held(k) ? weights[k] + pulled[k] : 0;
+      EXPECT_NEAR(found[k], expected, 1e-12 * (1 + x)) << k;
+    }
+    EXPECT_GT(held_points, 10);
+    EXPECT_LT(held_points, n / 2);
+  }
 }
 
 }  // namespace
