@@ -33,7 +33,7 @@ TANGERE_CLONES void interleave(const std::uint8_t* planes, std::uint8_t* to, std
 template <class T>
 struct WeighedRow {
   const T *planes, *colour_bar;  ///< levels (3, width); cotangents of clamped levels (width, 3)
-  T* planes_bar;                 ///< (3, width): factors, multiplied by the cotangents
+  T* planes_bar;                 ///< result: cotangents of levels (3, width)
   std::size_t width;
   std::array<T, kColours> gains;
 };
@@ -50,9 +50,9 @@ template <class T>
   };
 #pragma GCC ivdep
   for (std::size_t i = 0; i < width; ++i) {
-    r_bar[i] *= share(r[i], gains[0], bar[3 * i]);
-    g_bar[i] *= share(g[i], gains[1], bar[3 * i + 1]);
-    b_bar[i] *= share(b[i], gains[2], bar[3 * i + 2]);
+    r_bar[i] = share(r[i], gains[0], bar[3 * i]);
+    g_bar[i] = share(g[i], gains[1], bar[3 * i + 1]);
+    b_bar[i] = share(b[i], gains[2], bar[3 * i + 2]);
   }
 }
 TANGERE_CLONES void weigh_row(const WeighedRow<float>& row) { weigh_pixels(row); }
@@ -206,11 +206,9 @@ void GelCamera<T>::pull_back_colours(bool markers, std::span<const T> colour_bar
     if (move) shaded = planes_;
     if (markers) markers_->darken(row, planes_);
     add_draws(row);
-    // Factors of the markers, by painting a row of ones.
-    std::fill(planes_bar.begin(), planes_bar.end(), T(1));
-    if (markers) markers_->darken(row, planes_bar);
     weigh_row({planes_.data(), colour_bar.data() + kColours * static_cast<std::size_t>(row) * width,
                planes_bar.data(), width, gains_});
+    if (markers) markers_->darken(row, planes_bar);  // by the same factors as colours
     if (move) {
       for (std::size_t i = 0; i < width; ++i) {
         levels_bar[i] = 0;
