@@ -21,9 +21,17 @@ int validate_export(const std::string& path, const ExportedSet& set, const Conso
         fmt::format("'{}' has no checksums of its files: an older version wrote it; "
                     "export the data set again",
                     path));
-  const std::vector<std::string> problems = damaged_files(path, set.stored);
+  std::vector<std::string> problems = damaged_files(set.folder, set.stored);
+  if (set.format != "csv")
+    for (std::string& problem : foreign_files(set.folder, set.stored))
+      problems.push_back(std::move(problem));
   const ExitCode code = problems.empty() ? kDone : kInputOutput;
   for (const std::string& problem : problems) console.fail("tangere: " + problem);
+  if (set.stored.empty())
+    console.note(
+        fmt::format("'{}.json' is missing, so nothing is known of the table's sums and "
+                    "units",
+                    path));
   console.print(
       fmt::format("{}, episodes: {}, frames: {}, files: {}, {} bytes: {}", set.title, set.episodes,
                   set.frames, set.files, set.bytes,
@@ -48,6 +56,10 @@ int validate(const std::string& path, const Console& console) {
       "shards: {}, demos: {}, failed episodes: {}, rows: {}{}, {} bytes: {}", report.shards,
       report.demos, report.failed, report.rows, missed_text(report.steps), report.bytes,
       report.problems.empty() ? "whole" : fmt::format("{} problems", report.problems.size())));
+  if (!report.has_label_sums)
+    console.note(
+        "an older version wrote it: labels of its episodes (return, success, randomized …) have no "
+        "checksum");
   Json result{{"command", "validate"},
               {"exit_code", static_cast<int>(code)},
               {"input", path},

@@ -45,9 +45,33 @@ void describe_task(const h5::Id& scene, const DatasetLayout& layout) {
   h5::write_attribute(scene, "action_meaning", task.action.meaning);
   h5::write_scalar<double>(scene, "action_low", task.action.low);
   h5::write_scalar<double>(scene, "action_high", task.action.high);
-  std::vector<std::string> units, meanings;
-  for (const EpisodeChannel& channel : layout.channels())
-    if (channel.requested) units.push_back(channel.unit), meanings.push_back(channel.meaning);
+}
+
+/// Unit and meaning of an observation. A channel says them of readings and of what a task observes.
+std::pair<std::string, std::string> unit_and_meaning(const EpisodeChannel& channel) {
+  const FieldOutput of = channel.reading;
+  if (channel.kind == EpisodeChannel::Kind::end_effectors)
+    return {"m", "positions of the end effectors in the world"};
+  if (channel.kind == EpisodeChannel::Kind::bodies)
+    return {"m, m, m, 1, 1, 1, 1, rad/s, rad/s, rad/s, m/s, m/s, m/s",
+            "x y z qw qx qy qz, angular and linear velocity of each body's frame in the world"};
+  if (channel.kind == EpisodeChannel::Kind::reading && is_view(of.form))
+    return {is_colour(of.form)               ? "grey levels"
+            : of.form == FieldForm::view_ids ? "1"
+                                             : "m",
+            std::string(view_text(of.form))};
+  return {channel.unit, channel.meaning};
+}
+
+void describe_observations(const h5::Id& scene, const DatasetLayout& layout) {
+  const std::vector<EpisodeChannel> channels = layout.channels();
+  std::vector<std::string> names, units, meanings;
+  for (const std::size_t k : layout.recorded()) {
+    auto [unit, meaning] = unit_and_meaning(channels[k]);
+    names.push_back(channels[k].name);
+    units.push_back(std::move(unit)), meanings.push_back(std::move(meaning));
+  }
+  h5::write_attribute(scene, "observations", std::span<const std::string>(names));
   h5::write_attribute(scene, "observation_units", std::span<const std::string>(units));
   h5::write_attribute(scene, "observation_meanings", std::span<const std::string>(meanings));
 }
@@ -134,7 +158,7 @@ void describe_numbers(const h5::Id& scene, const DatasetLayout& layout) {
   };
   h5::write_attribute(scene, "quaternion_order", "w x y z");
   h5::write_attribute(scene, "observation_type", layout.single ? "float32" : "float64");
-  texts("observations", layout.observation_names());
+  describe_observations(scene, layout);
   describe_samples(scene, layout);
   describe_windows(scene, layout);
   texts("q_names", layout.q_names);
@@ -142,6 +166,7 @@ void describe_numbers(const h5::Id& scene, const DatasetLayout& layout) {
   texts("v_names", layout.v_names);
   texts("v_units", layout.v_units);
   texts("action_names", layout.action_names());
+  texts("action_units", layout.action_units());
   if (!layout.randomized_names.empty()) {
     texts("randomized_names", layout.randomized_names);
     texts("randomized_units", layout.randomized_units);
@@ -234,8 +259,33 @@ std::uint64_t hash_attributes(std::uint64_t hash, const h5::Id& object, const st
   return hash;
 }
 
+template <class T>
+std::uint64_t hash_numbers(std::uint64_t hash, const h5::Id& dataset) {
+  const h5::Dims dims = h5::dimensions(dataset);
+  hsize_t file_bytes = 0;
+  H5Fget_filesize(h5::Id(H5Iget_file_id(dataset.get())).get(), &file_bytes);
+  double count = 1;
+  for (const hsize_t size : dims) count *= static_cast<double>(size);
+  if (count > static_cast<double>(file_bytes))
+    throw IoError(fmt::format("{} claims {:.0f} numbers, and its file has {} bytes",
+                              h5::place_of(dataset), count, file_bytes));
+  std::vector<T> values(static_cast<std::size_t>(count));
+  if (!values.empty()) h5::read_box(dataset, h5::Dims(dims.size(), 0), dims, values.data());
+  return hash_text(hash, {reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T)});
+}
+
+/// Attributes and, unless `said_alone`, numbers.
+std::uint64_t hash_dataset(std::uint64_t hash, const h5::Id& dataset, const std::string& path,
+                           bool said_alone) {
+  hash = hash_attributes(hash, dataset, path);
+  if (said_alone) return hash;
+  const h5::Id type(H5Dget_type(dataset.get()));
+  return H5Tget_class(type.get()) == H5T_INTEGER ? hash_numbers<std::int64_t>(hash, dataset)
+                                                 : hash_numbers<double>(hash, dataset);
+}
+
 std::uint64_t hash_group(std::uint64_t hash, const h5::Id& group, const std::string& path,
-                         int depth) {
+                         bool said_alone, int depth = 1) {
   constexpr int kDeepest = 4;
   if (depth > kDeepest)
     throw IoError(fmt::format("{}: groups are nested deeper than {}", path, kDeepest));
@@ -243,8 +293,8 @@ std::uint64_t hash_group(std::uint64_t hash, const h5::Id& group, const std::str
   for (const std::string& name : h5::link_names(group)) {
     const std::string inner = path + "/" + name;
     hash = h5::is_dataset(group, name)
-               ? hash_attributes(hash, h5::open_dataset(group, name), inner)
-               : hash_group(hash, h5::open_group(group, name), inner, depth + 1);
+               ? hash_dataset(hash, h5::open_dataset(group, name), inner, said_alone)
+               : hash_group(hash, h5::open_group(group, name), inner, said_alone, depth + 1);
   }
   return hash;
 }
@@ -276,9 +326,15 @@ void describe_dataset(const h5::Id& file, const DatasetLayout& layout) {
 }
 
 std::uint64_t description_sum(const h5::Id& file) {
-  const std::uint64_t scene =
-      hash_group(0xCBF29CE484222325ULL, h5::open_group(file, "scene"), "/scene", 1);
-  return hash_text(scene, h5::read_text(h5::open_group(file, "data"), "env_args"));
+  const bool is_older = h5::read_number<std::int64_t>(file, "format_version") <= kUnlabelledFormat;
+  std::uint64_t hash =
+      hash_group(0xCBF29CE484222325ULL, h5::open_group(file, "scene"), "/scene", is_older);
+  hash = hash_text(hash, h5::read_text(h5::open_group(file, "data"), "env_args"));
+  if (is_older) return hash;
+  for (const char* name :
+       {"format", "format_version", "dataset_episodes", "dataset_shards", "command"})
+    hash = hash_text(hash_text(hash, name), h5::attribute_text(file, name));
+  return hash;
 }
 
 std::vector<Setting> settings_of(const DatasetLayout& layout) {

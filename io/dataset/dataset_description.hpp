@@ -13,17 +13,19 @@
 
 namespace tangere {
 
-/// `format_version` of shards that are written. Checks and merges also read the one before, whose
-/// checksum of numbers is another (ContentSum).
-inline constexpr std::int64_t kDatasetFormat = 6, kWholeRowsFormat = 5;
+/// `format_version` of shards that are written. Checks and merges also read two before: 6, which
+/// has no checksum of labels (LabelSum) and whose description_sum covers less, and 5, whose
+/// checksum of numbers also is another (ContentSum).
+inline constexpr std::int64_t kDatasetFormat = 7, kUnlabelledFormat = 6, kWholeRowsFormat = 5;
 /// `format` of all of them.
 inline constexpr const char* kFormatName = "tangere dataset";
 
 /// Writes the attributes of the root that belong to the whole data set, and the group /scene.
 void describe_dataset(const h5::Id& file, const DatasetLayout& layout);
 
-/// Checksum of every attribute of /scene and all below it, and of env_args of /data. Throws IoError
-/// for attributes that are damaged.
+/// Checksum of every attribute of /scene and all below it, and of env_args of /data; since
+/// kDatasetFormat also of the numbers of datasets below /scene, and of the root's attributes that
+/// all shards share. Throws IoError for attributes that are damaged.
 std::uint64_t description_sum(const h5::Id& file);
 
 /// Returns all settings on which the numbers of a data set depend, in a fixed order, from a layout

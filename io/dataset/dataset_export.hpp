@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Exports rows of a data set as a table, for tools that cannot read HDF5.
+// Exports rows of a data set as a table, for tools that cannot read HDF5. The table has names of
+// columns and numbers alone, so that readers of tables need no options.
 #pragma once
 
 #include <cstdint>
@@ -22,7 +23,9 @@ struct ExportResult {
 };
 
 /// Writes one line per row: episode, row, actions, reward, done, then every observation of at most
-/// 64 numbers. Reads each file whole, and compares it with its checksums. Throws IoError.
+/// 64 numbers. `path`.json says units of columns, counts, the data set's command, and size and sum
+/// of the table. Reads each file whole, and compares it with its checksums. Throws IoError;
+/// InputError if `path`.json is to be replaced and is something else.
 ExportResult export_csv(const DatasetFiles& dataset, const std::string& path,
                         const ExportOptions& options);
 

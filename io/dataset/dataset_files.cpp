@@ -12,6 +12,7 @@
 
 #include "engine/base/error.hpp"
 #include "io/dataset/dataset_description.hpp"
+#include "io/dataset/label_sum.hpp"
 #include "io/dataset/shard_check.hpp"
 #include "io/files/input_files.hpp"
 #include "io/hdf5/h5_listing.hpp"
@@ -268,6 +269,38 @@ void check_complete(const DatasetFiles& dataset) {
     throw IoError(fmt::format("'{}' {}", misplaced.front().first, misplaced.front().second));
 }
 
+namespace {
+
+/// What is wrong with the files that merge makes of shards, if they are there.
+std::vector<std::string> merged_problems(const DatasetFiles& dataset) {
+  std::vector<std::string> problems;
+  std::error_code none;
+  const std::string merged = (fs::path(dataset.folder) / "robomimic.hdf5").string();
+  if (fs::exists(merged, none)) {
+    for (const std::string& line : differences_of(merged, dataset.settings))
+      problems.push_back(fmt::format("{}: {}", merged, line));
+    if (problems.empty())
+      for (const std::string& problem : examine_merged(merged).problems)
+        problems.push_back(fmt::format("{}: {}", merged, problem));
+  }
+  for (const fs::directory_entry& entry :
+       fs::recursive_directory_iterator(fs::path(dataset.folder) / "minari", none)) {
+    if (entry.path().filename() != "main_data.hdf5") continue;
+    try {
+      const h5::Id file = h5::open_file(entry.path().string());
+      const auto expected = h5::read_number<std::uint64_t>(file, "total_episodes");
+      if (const std::size_t found = h5::link_count(file); found != expected)
+        problems.push_back(fmt::format("{}: it has {} episodes; expected {}", entry.path().string(),
+                                       found, expected));
+    } catch (const IoError& error) {
+      problems.push_back(fmt::format("{}: {}", entry.path().string(), error.what()));
+    }
+  }
+  return problems;
+}
+
+}  // namespace
+
 DatasetReport examine_dataset(const DatasetFiles& dataset) {
   DatasetReport report;
   for (const std::string& file : dataset.missing) report.problems.push_back(file + ": missing");
@@ -286,9 +319,22 @@ DatasetReport examine_dataset(const DatasetFiles& dataset) {
     report.failed += shard.content.failed;
     report.rows += shard.content.rows;
     add_steps(report.steps, shard.content.steps);
+    if (shard.problems.empty() && !shard.content.has_label_sum) report.has_label_sums = false;
     report.bytes += fs::file_size(file);
   }
+  if (!dataset.folder.empty())
+    for (std::string& problem : merged_problems(dataset))
+      report.problems.push_back(std::move(problem));
   return report;
+}
+
+void check_mask_of(const std::string& path, const std::string& name) {
+  try {
+    const h5::Id file = h5::open_file(path);
+    check_mask(h5::open_dataset(file, "mask/" + name), name);
+  } catch (const IoError& error) {
+    throw IoError(fmt::format("{}: {}", path, error.what()));
+  }
 }
 
 DatasetSummary summarise(const DatasetFiles& dataset) {

@@ -43,8 +43,12 @@ struct DatasetReport {
   std::int64_t shards = 0, demos = 0, failed = 0, rows = 0;
   std::optional<EpisodeSteps> steps = EpisodeSteps();  ///< none: an older version wrote a shard
   std::uint64_t bytes = 0;
+  bool has_label_sums = true;  ///< false: an older version wrote a shard
 };
 DatasetReport examine_dataset(const DatasetFiles& dataset);
+
+/// Compares a mask of a merged file with its checksum, if it has one. Throws IoError.
+void check_mask_of(const std::string& path, const std::string& name);
 
 /// Metadata of a file.
 struct DatasetSummary {

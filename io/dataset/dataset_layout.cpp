@@ -107,6 +107,11 @@ std::vector<std::string> DatasetLayout::action_names() const {
   return names;
 }
 
+std::vector<std::string> DatasetLayout::action_units() const {
+  if (!task) return u_units;
+  return std::vector<std::string>(task->action.size(), task->action.unit);
+}
+
 std::vector<std::string> DatasetLayout::observation_names() const {
   std::vector<std::string> names;
   for (const EpisodeChannel& channel : channels())

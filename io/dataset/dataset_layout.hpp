@@ -88,6 +88,8 @@ struct DatasetLayout : RunFacts {
   [[nodiscard]] std::int64_t rows() const { return steps / every; }
   /// Names of the numbers of an action.
   [[nodiscard]] std::vector<std::string> action_names() const;
+  /// Their units: "m", "rad" of targets of position motors, else "1"; of a task its own.
+  [[nodiscard]] std::vector<std::string> action_units() const;
   /// All observations, in the order of pieces of episodes. Throws InputError for times that are no
   /// multiple of K.
   [[nodiscard]] std::vector<EpisodeChannel> channels() const {

@@ -11,6 +11,7 @@
 #include "io/dataset/dataset_description.hpp"
 #include "io/dataset/demo_links.hpp"
 #include "io/dataset/grown_file.hpp"
+#include "io/dataset/label_sum.hpp"
 #include "io/dataset/minari_view.hpp"
 #include "io/dataset/shard_check.hpp"
 #include "io/hdf5/h5_links.hpp"
@@ -95,6 +96,7 @@ class Merger {
       h5::write_attribute(file_.file(), name, h5::read_text(from, name));
     const auto number = [&](const char* name) { return h5::read_number<std::int64_t>(from, name); };
     h5::write_scalar<std::int64_t>(file_.file(), "format_version", number("format_version"));
+    if (number("format_version") > kUnlabelledFormat) labels_ = 0;
     for (const char* name : {"dataset_episodes", "dataset_shards"})
       h5::write_scalar<std::int64_t>(file_.file(), name, number(name));
     h5::write_scalar<std::int64_t>(file_.file(), "first_episode", 0);
@@ -139,6 +141,7 @@ class Merger {
     rows_ += h5::read_number<std::int64_t>(data, "total");
     add_steps(steps_, stored_steps(from));
     sum_ += h5::read_number<std::uint64_t>(from, "content_sum");  // modulo 2⁶⁴, as within a shard
+    if (labels_) *labels_ += h5::read_number<std::uint64_t>(from, "label_sum");  // the same
   }
 
   LinkedDemo described(const std::string& shard, const h5::Id& data, std::int64_t number) {
@@ -217,6 +220,7 @@ class Merger {
     write_masks();
     if (steps_) write_steps(file_.file(), *steps_);
     h5::write_scalar<std::uint64_t>(file_.file(), "content_sum", sum_);
+    if (labels_) h5::write_scalar<std::uint64_t>(file_.file(), "label_sum", *labels_);
     if (description_)
       h5::write_scalar<std::uint64_t>(file_.file(), "description_sum", *description_);
     result_.demos = std::ssize(demos_);
@@ -240,6 +244,9 @@ class Merger {
       for (const MaskedDemo& demo : demos_)
         if (has(demo)) list.push_back(demo.number);
       h5::write_names(masks, name, "demo_", list);
+      std::vector<std::string> names;
+      for (const std::int64_t number : list) names.push_back(fmt::format("demo_{}", number));
+      h5::write_scalar<std::uint64_t>(h5::open_dataset(masks, name), kMaskSum, sum_of_names(names));
       return std::ssize(list);
     };
     const auto write_parts = [&](const std::string& name, const auto& has) {
@@ -267,6 +274,7 @@ class Merger {
   h5::Id copied_;  // group of demos
   std::string env_args_;
   std::optional<std::uint64_t> description_;  // description_sum of the shards
+  std::optional<std::uint64_t> labels_;       // label_sum of the shards; none: they have none
   bool few_each_ = false;                     // episodes in a shard
   std::optional<DemoMembers> members_;
   std::optional<MinariView> view_;

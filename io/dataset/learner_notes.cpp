@@ -131,6 +131,22 @@ std::string touch_observations(const DatasetLayout& layout) {
   return name_list(names);
 }
 
+std::string json_of(const TableFacts& facts) {
+  const Json json{{"format", kTableFormat},
+                  {"command", facts.command},
+                  {"tangere_version", facts.version},
+                  {"scene", facts.scene},
+                  {"seed", facts.seed},
+                  {"seconds_per_frame", facts.seconds_per_frame},
+                  {"episodes", facts.episodes},
+                  {"frames", facts.frames},
+                  {"columns", facts.columns},
+                  {"units", facts.units},
+                  {"bytes", facts.bytes},
+                  {"crc32", facts.crc32}};
+  return json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
 std::string json_of(const IncludedTexts& texts) { return text_of(Json(texts)); }
 
 IncludedTexts included_texts_in(const std::string& json) {

@@ -3,6 +3,7 @@
 // are privileged or touch. It is JSON text, which robomimic and Minari store unchanged.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -40,6 +41,19 @@ std::string privileged_observations(const DatasetLayout& layout);
 
 /// [KEY, …] of the stored observations that are touch, DatasetLayout::touch().
 std::string touch_observations(const DatasetLayout& layout);
+
+/// What a table of `tangere export` says in the file beside it.
+struct TableFacts {
+  std::string command, version, scene, seed;  ///< of the data set
+  double seconds_per_frame = 0;
+  std::int64_t episodes = 0, frames = 0;
+  std::vector<std::string> columns, units;  ///< of each column; the unit may be empty
+  std::uint64_t bytes = 0;
+  std::uint32_t crc32 = 0;  ///< of the bytes of the table
+};
+std::string json_of(const TableFacts& facts);
+/// `format` of them, which tells them from other files of JSON.
+inline constexpr const char* kTableFormat = "tangere table";
 
 /// Texts of included files as a JSON object, and from one. Throws IoError for another text.
 std::string json_of(const IncludedTexts& texts);

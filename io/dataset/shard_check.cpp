@@ -14,6 +14,7 @@
 #include "engine/base/error.hpp"
 #include "io/dataset/content_sum.hpp"
 #include "io/dataset/dataset_description.hpp"
+#include "io/dataset/label_sum.hpp"
 #include "io/files/jpeg_file.hpp"
 #include "io/hdf5/h5.hpp"
 #include "io/hdf5/h5_listing.hpp"
@@ -60,21 +61,52 @@ class ShardChecker {
     if (problems_.empty() && sum_.value() != expected)
       fail(fmt::format("the checksum of its numbers is {:016x}; expected {:016x}", sum_.value(),
                        expected));
+    check_label_sum();
     check_description_sum();
+    check_masks();
     problems_.insert(problems_.end(), not_finite_.begin(), not_finite_.end());
     return {content_, problems_};
   }
 
+  ShardReport check_merged() {
+    const h5::Quiet quiet;
+    if (!is_of_this_format() || !is_described()) return {content_, problems_};
+    const h5::Id data = h5::open_group(file_, "data"), failed = h5::open_group(file_, "failed");
+    if (!count_episodes(data, failed)) return {content_, problems_};
+    summed_ = true;
+    for (std::int64_t episode = content_.first_episode; episode < end_; ++episode) {
+      const std::string demo = fmt::format("demo_{}", episode);
+      if (!h5::has_link(data, demo)) {
+        try_failed(failed, episode);
+        continue;
+      }
+      const h5::Id group = h5::open_group(data, demo);
+      if (is_copied(group)) return labels_ = {}, content_ = {}, check();
+      labels_.add_demo(episode, group);
+    }
+    check_label_sum();
+    check_description_sum();
+    check_masks();
+    return {content_, problems_};
+  }
+
  private:
+  /// Whether numbers of a demo are in this file.
+  static bool is_copied(const h5::Id& demo) {
+    H5L_info_t link;
+    return H5Lget_info(demo.get(), "actions", &link, H5P_DEFAULT) >= 0 &&
+           link.type == H5L_TYPE_HARD;
+  }
   [[nodiscard]] bool is_of_this_format() {
     if (h5::read_text(file_, "format") != kFormatName) {
       fail("it is not a tangere data set");
     } else if (const std::int64_t version = number(file_, "format_version");
-               version != kDatasetFormat && version != kWholeRowsFormat) {
-      fail(fmt::format("its format_version is {}; expected {} or {} (generate the data set again)",
+               version < kWholeRowsFormat || version > kDatasetFormat) {
+      fail(fmt::format("its format_version is {}; expected {} to {} (generate the data set again)",
                        version, kWholeRowsFormat, kDatasetFormat));
     } else {
       sum_ = ContentSum(version == kWholeRowsFormat);
+      content_.has_label_sum = version > kUnlabelledFormat;
     }
     return problems_.empty();
   }
@@ -117,12 +149,37 @@ class ShardChecker {
     for (const std::string& name : h5::attribute_names(object))
       static_cast<void>(h5::attribute_text(object, name));
   }
+  void check_label_sum() {
+    if (!problems_.empty() || !content_.has_label_sum) return;
+    try {
+      if (content_.steps) labels_.add(*content_.steps);
+      const auto expected = h5::read_number<std::uint64_t>(file_, "label_sum");
+      if (labels_.value() != expected)
+        fail(
+            fmt::format("the checksum of its episodes' labels (return, success, randomized …) is "
+                        "{:016x}; expected {:016x}",
+                        labels_.value(), expected));
+    } catch (const IoError& error) {
+      fail(error.what());
+    }
+  }
+  /// Of a merged file. A mask that a user has put there has no checksum.
+  void check_masks() {
+    if (!problems_.empty() || !h5::has_link(file_, "mask")) return;
+    try {
+      const h5::Id masks = h5::open_group(file_, "mask");
+      for (const std::string& name : h5::link_names(masks))
+        check_mask(h5::open_dataset(masks, name), name);
+    } catch (const IoError& error) {
+      fail(error.what());
+    }
+  }
   /// Files of older versions have no such sum.
   void check_description_sum() {
     if (!problems_.empty()) return;
     try {
       const std::uint64_t found = description_sum(file_);
-      if (H5Aexists(file_.get(), "description_sum") <= 0) return;
+      if (!content_.has_label_sum && H5Aexists(file_.get(), "description_sum") <= 0) return;
       const auto expected = h5::read_number<std::uint64_t>(file_, "description_sum");
       if (found != expected)
         fail(fmt::format("the checksum of its description is {:016x}; expected {:016x}", found,
@@ -148,7 +205,17 @@ class ShardChecker {
     if (is_demo)
       try_demo(data, demo, episode);
     else
-      ++content_.failed;
+      try_failed(failed, episode);
+  }
+  void try_failed(const h5::Id& failed, std::int64_t episode) {
+    ++content_.failed;
+    const std::string name = fmt::format("episode_{}", episode);
+    if (!summed_ || !h5::has_link(failed, name)) return;
+    try {
+      labels_.add_failed(episode, h5::open_group(failed, name));
+    } catch (const IoError& error) {
+      fail(fmt::format("{}: {}", name, error.what()));
+    }
   }
   void fail(const std::string& what) {
     if (problems_.size() < kMostProblems) problems_.push_back(what);
@@ -157,6 +224,7 @@ class ShardChecker {
     try {
       const h5::Id group = h5::open_group(data, demo);
       check_attributes(group);
+      if (summed_) labels_.add_demo(episode, group);
       add_demo(group, episode);
     } catch (const IoError& error) {
       fail(fmt::format("{}: {}", demo, error.what()));
@@ -432,6 +500,7 @@ class ShardChecker {
              std::vector<std::int16_t>>
       buffers_;
   ContentSum sum_;
+  LabelSum labels_;
   ShardContent content_;
 };
 
@@ -440,6 +509,14 @@ class ShardChecker {
 ShardReport examine_shard(const std::string& path) {
   try {
     return ShardChecker(path, true).check();
+  } catch (const IoError& error) {
+    return {{}, {error.what()}};
+  }
+}
+
+ShardReport examine_merged(const std::string& path) {
+  try {
+    return ShardChecker(path, true).check_merged();
   } catch (const IoError& error) {
     return {{}, {error.what()}};
   }

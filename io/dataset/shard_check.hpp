@@ -18,6 +18,7 @@ struct ShardContent {
   std::int64_t demos = 0, failed = 0;  ///< episodes below /data and below /failed
   std::int64_t rows = 0;               ///< of all demos
   std::optional<EpisodeSteps> steps;   ///< of all episodes; none: an older version wrote the shard
+  bool has_label_sum = false;          ///< false: an older version wrote the shard
 };
 
 struct ShardReport {
@@ -28,6 +29,9 @@ struct ShardReport {
 /// Reads a whole shard and reports all that is wrong with it, including numbers that are not
 /// finite. A file that cannot be read is a problem in the report, not an exception.
 ShardReport examine_shard(const std::string& path);
+
+/// The same of a merged file, without the numbers that it links. Those of a copy are read.
+ShardReport examine_merged(const std::string& path);
 
 /// Reads a whole shard. Throws IoError naming the file and what is missing or differs.
 ShardContent check_shard(const std::string& path);

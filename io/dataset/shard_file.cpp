@@ -296,6 +296,7 @@ void ShardFile::close_block(Block& block, std::int64_t first_episode, const h5::
     members_.push_back({first_episode + static_cast<std::int64_t>(e), group});
     rows_ += demo.facts.rows;
     sum_.add(demo.sum);
+    labels_.add_demo(members_.back().number, DemoAttributes(demo.facts).all());
   }
   descriptions.add(indexes.all());
   placed_.add(block.base, descriptions.all(), {"descriptions from demo_", first_episode});
@@ -318,6 +319,7 @@ void ShardFile::record_failures() {
     if (facts.end) h5::write_scalar<std::int64_t>(group, "policy", facts.end->policy);
     if (!facts.randomized.empty()) h5::write_list<double>(group, "randomized", facts.randomized);
     if (!facts.gains.empty()) h5::write_list<double>(group, "picture_gains", facts.gains);
+    labels_.add_failed(failure.episode, group);
   }
 }
 
@@ -330,6 +332,8 @@ void ShardFile::complete_description(std::uint64_t data) {
   h5::write_scalar<std::int64_t>(group, "total", rows_);
   record_failures();
   write_steps(file_, steps_);
+  labels_.add(steps_);
+  h5::write_scalar<std::uint64_t>(file_, "label_sum", labels_.value());
   h5::write_scalar<std::uint64_t>(file_, "content_sum", sum_.value());
   try {
     h5::write_scalar<std::uint64_t>(file_, "description_sum", description_sum(file_));

@@ -12,6 +12,7 @@
 #include "engine/rows/episode_sink.hpp"
 #include "io/dataset/dataset_layout.hpp"
 #include "io/dataset/demo_format.hpp"
+#include "io/dataset/label_sum.hpp"
 #include "io/dataset/placed_file.hpp"
 #include "io/dataset/prepared_piece.hpp"
 #include "io/files/part_file.hpp"
@@ -110,6 +111,7 @@ class ShardFile {
   std::map<std::int64_t, DemoFacts> facts_of_failures_;  // by episode
   std::int64_t rows_ = 0;                                // in demos, without failed ones
   ContentSum sum_;
+  LabelSum labels_;
   EpisodeSteps steps_;
 };
 

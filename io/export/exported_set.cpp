@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cstring>
 #include <filesystem>
@@ -223,37 +224,84 @@ std::optional<std::int64_t> counted(const std::string& title, const std::string&
   return count;
 }
 
-/// A table whose end is missing has fewer rows than its title says, or no end of the last line.
-void check_table(const fs::path& path, const std::string& title, bool ends, ExportedSet& set) {
+/// Rows and episodes that a table should have, and who says so.
+struct TableCounts {
+  std::optional<std::int64_t> rows, episodes;
+  std::string source;
+};
+
+/// A table whose end is missing has fewer rows than are counted, or no end of the last line.
+void check_table(const fs::path& path, std::int64_t lines, bool ends, const TableCounts& counts,
+                 const ExportedSet& set) {
   if (set.frames > 0 && !ends)
-    damaged(path, fmt::format("line {} does not end; expected rows that do", set.frames + 2));
-  const std::optional<std::int64_t> rows = counted(title, " rows"),
-                                    episodes = counted(title, " episodes");
-  if (rows && episodes && (*rows != set.frames || *episodes != set.episodes))
-    damaged(path, fmt::format("it has {} rows of {} episodes; expected {} of {}, as its first line "
-                              "says",
-                              set.frames, set.episodes, *rows, *episodes));
+    damaged(path, fmt::format("line {} does not end; expected rows that do", lines));
+  if (counts.rows && counts.episodes &&
+      (*counts.rows != set.frames || *counts.episodes != set.episodes))
+    damaged(path, fmt::format("it has {} rows of {} episodes; expected {} of {}, as {}", set.frames,
+                              set.episodes, *counts.rows, *counts.episodes, counts.source));
 }
 
-/// A table: a line that says of what, the names of columns, a line for each row.
+/// The file beside a table that says what it is; none where there is none.
+std::optional<JsonFile> facts_of_table(const fs::path& path) {
+  const std::string facts = path.string() + ".json";
+  std::error_code none;
+  if (!fs::is_regular_file(facts, none)) return {};
+  JsonFile file(facts);
+  if (!file.has({"format"}) || file.text({"format"}) != "tangere table") return {};
+  return file;
+}
+
+/// Adds units and what the facts say of the data set. Returns what they count.
+TableCounts add_facts(const fs::path& path, const JsonFile& facts, ExportedSet& set) {
+  const std::vector<std::string> columns = facts.texts({"columns"}), units = facts.texts({"units"});
+  if (columns.size() != set.arrays.size() + 2 || units.size() != columns.size())
+    damaged(facts.path(),
+            fmt::format("it has {} columns and {} units; expected {}, as '{}'", columns.size(),
+                        units.size(), set.arrays.size() + 2, path.string()));
+  for (std::size_t k = 2; k < columns.size(); ++k) {
+    if (columns[k] != set.arrays[k - 2].name)
+      damaged(path, fmt::format("column {} is '{}'; expected '{}', as '{}' says", k + 1,
+                                set.arrays[k - 2].name, columns[k], facts.path()));
+    set.arrays[k - 2].unit = units[k];
+  }
+  add_source(facts, set);
+  set.title = fmt::format("table of {}, seed {}", facts.text({"scene"}), facts.text({"seed"}));
+  set.seconds_per_frame = facts.number({kSeconds});
+  set.stored = {{path.filename().string(), 1, static_cast<std::uint64_t>(facts.count({"bytes"})),
+                 static_cast<std::uint64_t>(facts.count({"crc32"})), false}};
+  return {facts.count({"frames"}), facts.count({"episodes"}),
+          fmt::format("'{}' says", facts.path())};
+}
+
+/// A table: the names of columns, a line for each row. Of an older version a line comes first that
+/// says of what.
 std::optional<ExportedSet> read_table(const fs::path& path) {
+  constexpr std::string_view kBegin = "episode,row,", kOlder = "# ";
   std::ifstream file(path, std::ios::binary);
+  std::array<char, kBegin.size()> first{};  // a file of another kind may have no lines
+  file.read(first.data(), first.size());
+  const std::string_view start(first.data(), static_cast<std::size_t>(file.gcount()));
+  const bool is_older = start.starts_with(kOlder) && path.extension() == ".csv";
+  if (start != kBegin && !is_older) return {};
+  file.seekg(0);
   std::string title, names;
-  constexpr std::string_view kBegin = "episode,row,";
-  if (!std::getline(file, title) || !title.starts_with("# ") || !std::getline(file, names) ||
-      !names.starts_with(kBegin))
-    return {};
+  if (is_older) std::getline(file, title);
+  if (!std::getline(file, names) || !names.starts_with(kBegin)) return {};
   ExportedSet set;
-  set.format = "csv", set.title = "table of " + title.substr(2);
+  set.format = "csv", set.title = is_older ? "table of " + title.substr(kOlder.size()) : "table";
   for (std::size_t begin = kBegin.size(); begin <= names.size();) {
     const std::size_t end = std::min(names.find(',', begin), names.size());
     set.arrays.push_back({names.substr(begin, end - begin), "number", {}, ""});
     begin = end + 1;
   }
+  TableCounts counts{counted(title, " rows"), counted(title, " episodes"), "its first line says"};
+  if (const std::optional<JsonFile> facts = facts_of_table(path))
+    counts = add_facts(path, *facts, set);
   const auto columns = std::ssize(set.arrays) + 2;
   std::string line, last;
   bool ends = true;
-  for (std::int64_t number = 3; std::getline(file, line); ++number) {
+  std::int64_t number = is_older ? 3 : 2;
+  for (; std::getline(file, line); ++number) {
     ends = !file.eof();
     if (std::count(line.begin(), line.end(), ',') + 1 != columns || line.empty())
       damaged(path, fmt::format("line {} has {} columns; expected {}", number,
@@ -262,7 +310,7 @@ std::optional<ExportedSet> read_table(const fs::path& path) {
     if (episode != last) ++set.episodes, last = episode;
     ++set.frames;
   }
-  check_table(path, title, ends, set);
+  check_table(path, number - 1, ends, counts, set);
   return set;
 }
 
@@ -291,11 +339,12 @@ std::optional<ExportedSet> find_export(const std::string& path) {
     set = read_zarr(place);
   } else if (fs::is_directory(place / "hdf5", none)) {
     set = read_univtac(place);
-  } else if (place.extension() == ".csv" && fs::is_regular_file(place, none)) {
+  } else if (fs::is_regular_file(place, none)) {
     set = read_table(place);
   }
   if (!set) return set;
-  check_sizes(place, set->stored);
+  set->folder = (set->format == "csv" ? place.parent_path() : place).string();
+  check_sizes(set->folder, set->stored);
   add_sizes(place, *set);
   return set;
 }

@@ -27,7 +27,8 @@ struct ExportedSet {
   std::int64_t files = 0;
   std::uintmax_t bytes = 0;  ///< of all files
   std::vector<ExportedArray> arrays;
-  std::vector<StoredFiles> stored;  ///< what it says of its files; none of a table
+  std::vector<StoredFiles> stored;  ///< what it says of its files; none: it does not
+  std::string folder;               ///< in which they lie
 };
 
 /// Describes an export; none where the path is something else. Throws IoError for an export that is

@@ -6,8 +6,10 @@
 #include <fmt/format.h>
 #include <libdeflate.h>
 
+#include <algorithm>
 #include <cstring>
 #include <fstream>
+#include <set>
 
 #include "engine/base/error.hpp"
 
@@ -41,10 +43,10 @@ StoredFiles sizes_of(const fs::path& folder, const std::string& path) {
   return found;
 }
 
-std::uint64_t sum_of(const fs::path& path) {
+std::uint64_t sum_of(const fs::path& path, bool named) {
   std::ifstream file(path, std::ios::binary);
   const std::string name = path.filename().string();
-  std::uint32_t sum = libdeflate_crc32(0, name.c_str(), name.size() + 1);
+  std::uint32_t sum = named ? libdeflate_crc32(0, name.c_str(), name.size() + 1) : 0;
   std::vector<char> block(kBlock);
   while (file) {
     file.read(block.data(), std::ssize(block));
@@ -109,6 +111,28 @@ void check_sizes(const fs::path& folder, const std::vector<StoredFiles>& stored)
       throw IoError(fault);
 }
 
+std::vector<std::string> foreign_files(const fs::path& folder,
+                                       const std::vector<StoredFiles>& stored) {
+  std::set<std::string> known{"meta/info.json", "meta/tangere.json"};  // people may edit these
+  for (const StoredFiles& one : stored) known.insert(one.path);
+  std::vector<std::string> faults;
+  std::error_code none;
+  for (const char* const place : {"data", "meta", "videos", "hdf5"})
+    for (const fs::directory_entry& entry :
+         fs::recursive_directory_iterator(folder / place, none)) {
+      const fs::path path = entry.path().lexically_relative(folder);
+      if (!entry.is_regular_file(none) || path.filename().string().front() == '.' ||
+          known.contains(path.string()) || known.contains(path.parent_path().string()))
+        continue;
+      faults.push_back(
+          fmt::format("'{}' is not a file of this export; expected none, because a reader may take "
+                      "it for a part of the data set",
+                      entry.path().string()));
+    }
+  std::sort(faults.begin(), faults.end());
+  return faults;
+}
+
 std::vector<std::string> damaged_files(const fs::path& folder,
                                        const std::vector<StoredFiles>& stored) {
   std::vector<std::string> faults;
@@ -118,7 +142,8 @@ std::vector<std::string> damaged_files(const fs::path& folder,
       continue;
     }
     std::uint64_t sum = 0;
-    for (const fs::path& file : files_of(folder / expected.path)) sum += sum_of(file);
+    for (const fs::path& file : files_of(folder / expected.path))
+      sum += sum_of(file, expected.named);
     sum &= 0xFFFFFFFF;
     if (sum != expected.sum)
       faults.push_back(

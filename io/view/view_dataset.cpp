@@ -27,19 +27,32 @@ struct Demo {
   std::int64_t number, rows;
 };
 
-/// The scene that a command "tangere generate SCENE --episodes …" names, if it has this text.
-std::string scene_of_command(const std::string& command, const std::string& text) {
-  constexpr std::string_view kBegin = "tangere generate ", kEnd = " --episodes ";
-  const std::size_t end = command.find(kEnd);
-  if (!command.starts_with(kBegin) || end == std::string::npos) return "";
-  std::string path = command.substr(kBegin.size(), end - kBegin.size());
+/// Whether a file has this text.
+bool has_text(const std::filesystem::path& path, const std::string& text) {
   std::error_code none;
   if (!std::filesystem::is_regular_file(path, none) ||  // a device might never end
       std::filesystem::file_size(path, none) != text.size())
-    return "";
+    return false;
   std::ifstream file(path, std::ios::binary);
   const std::string found{std::istreambuf_iterator<char>(file), {}};
-  return file && found == text ? path : "";
+  return file && found == text;
+}
+
+/// The scene that a command "tangere generate SCENE --episodes …" names, if it has this text. If it
+/// has not, a file of the same name in the data set's folder, or beside that: folders are moved.
+std::string scene_of_command(const std::string& command, const std::string& text,
+                             const std::string& dataset) {
+  constexpr std::string_view kBegin = "tangere generate ", kEnd = " --episodes ";
+  const std::size_t end = command.find(kEnd);
+  if (!command.starts_with(kBegin) || end == std::string::npos) return "";
+  const std::filesystem::path path(command.substr(kBegin.size(), end - kBegin.size()));
+  const std::filesystem::path set = std::filesystem::absolute(dataset).lexically_normal(),
+                              folder = std::filesystem::is_directory(set) ? set : set.parent_path(),
+                              inner = folder.has_filename() ? folder : folder.parent_path();
+  for (const std::filesystem::path& place :
+       {path, inner / path.filename(), inner.parent_path() / path.filename()})
+    if (has_text(place, text)) return place.string();
+  return "";
 }
 
 class DatasetView {
@@ -87,7 +100,7 @@ class DatasetView {
       included = included_texts_in(h5::read_text(scene, "included"));
     const std::string command =
         H5Aexists(file.get(), "command") > 0 ? h5::read_text(file, "command") : "";
-    const std::string path = scene_of_command(command, text);
+    const std::string path = scene_of_command(command, text, path_);
     return std::make_unique<ViewScene>(text, path.empty() ? data_.title : path, path_, options_,
                                        included);
   }

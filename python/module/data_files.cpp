@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Whether files of data sets and of exports are whole.
 #include <nanobind/stl/filesystem.h>
+#include <nanobind/stl/string.h>
 
 #include <cstdint>
 #include <filesystem>
+#include <string>
 
 #include "io/dataset/dataset_files.hpp"
 #include "io/dataset/shard_check.hpp"
@@ -21,6 +23,10 @@ namespace {
 /// Keeps the GIL: h5py may share the library for HDF5 (episode_writer.cpp).
 void check_file(const std::filesystem::path& path) { check_shard(path.string()); }
 
+void check_stored_mask(const std::filesystem::path& path, const std::string& name) {
+  check_mask_of(path.string(), name);
+}
+
 void check_set(const std::filesystem::path& path) { check_complete(find_dataset(path.string())); }
 
 std::uintptr_t filter_address() { return reinterpret_cast<std::uintptr_t>(h5::lz4_filter()); }
@@ -33,6 +39,8 @@ void add_data_files(nb::module_& m) {
   m.def("check_shard", check_file, "path"_a,
         "Reads a file of a data set whole. IoError: it cannot be read, or its numbers or its\n"
         "description do not have the checksums that it stores; the message names both.");
+  m.def("check_mask", check_stored_mask, "path"_a, "name"_a,
+        "IoError: the names in a mask of a merged file do not have the checksum that it stores.");
   m.def("check_dataset", check_set, "path"_a,
         "Compares the shards of a folder with each other. IoError: one is missing, belongs to\n"
         "another run, or holds other episodes than its number says.");

@@ -48,10 +48,10 @@ TEST(Command, HelpEndsWithAnExampleThatWorks) {
     const Outcome outcome = run(folder, example);
     EXPECT_EQ(outcome.exit_code, 0) << help.out << outcome.err;
   }
-  std::vector<std::string> files = {"ball.h5",      "ball.html",   "ball.svg",
-                                    "balls",        "balls.csv",   "fit.svg",
-                                    "gripper.urdf", "gripper.xml", "my_gel_measured.xml",
-                                    "press.csv",    "scenes",      "speed.svg"};
+  std::vector<std::string> files = {
+      "ball.h5",        "ball.html", "ball.svg",     "balls",       "balls.csv",
+      "balls.csv.json", "fit.svg",   "gripper.urdf", "gripper.xml", "my_gel_measured.xml",
+      "press.csv",      "scenes",    "speed.svg"};
   if (kSanitized) files.pop_back();  // of `bench`
   EXPECT_THAT(folder.files(), testing::ElementsAreArray(files));
 }

@@ -326,7 +326,7 @@ std::vector<Violation> check_heavy_headers(const Tree& tree) {
         {"tasks/calibration", 3},
         {"tasks/catalogue", 1},
         {"tasks/gradients", 1}}},
-      {"hdf5.h", {{"io/hdf5", 10}, {"io/dataset", 10}, {"io/trajectory", 6}, {"io/view", 4}}},
+      {"hdf5.h", {{"io/hdf5", 10}, {"io/dataset", 11}, {"io/trajectory", 6}, {"io/view", 4}}},
       {"nlohmann/json.hpp", {{"apps", 34}, {"io/dataset", 2}, {"io/export", 1}, {"io/view", 1}}},
       {"tbb/flow_graph.h", {{"tasks/run", 1}}},
       {"regex", {}},

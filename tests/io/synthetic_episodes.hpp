@@ -25,6 +25,7 @@ inline DatasetLayout dataset_layout(std::int64_t episodes, bool single = true) {
   l.v_names = {"a.vx", "b"};
   l.v_units = {"m/s", "rad/s"};
   l.u_names = {"a.vx", "b"};
+  l.u_units = {"m", "1"};
   l.sensors = {skin()};
   l.scene_name = "syn \"thetic\"";
   l.scene_text = "<tangere/>";

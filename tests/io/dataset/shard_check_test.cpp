@@ -28,7 +28,9 @@ using ::testing::HasSubstr;
 class ShardCheck : public ::testing::Test {
  protected:
   ShardCheck() {
-    const DatasetLayout l = dataset_layout(20);
+    DatasetLayout l = dataset_layout(20);
+    l.randomized_names = {"ground box mu"};
+    l.randomized_units = {"1"};
     DatasetWriter writer({folder_ / "set"}, l);
     testing::write_block(writer, l, 0);
     testing::write_block(writer, l, 16, {testing::failure(17)});
@@ -65,6 +67,14 @@ class ShardCheck : public ::testing::Test {
     how(file);
     H5Fclose(file);
   }
+  /// As versions before labels had a checksum wrote it.
+  void make_older(std::int64_t version) const {
+    change([&](hid_t file) {
+      set(file, "/", "format_version", version);
+      H5Adelete(file, "label_sum");
+      H5Adelete(file, "description_sum");
+    });
+  }
   static void set(hid_t file, const char* object, const char* name, std::int64_t value) {
     const hid_t owner = H5Oopen(file, object, H5P_DEFAULT),
                 attribute = H5Aopen(owner, name, H5P_DEFAULT);
@@ -92,13 +102,21 @@ TEST_F(ShardCheck, RefusesEarlierFormats) {
   for (const std::int64_t version : {1, 2, 3, 4}) {
     change([&](hid_t file) { set(file, "/", "format_version", version); });
     EXPECT_THAT(complaint(), HasSubstr("its format_version is " + std::to_string(version) +
-                                       "; expected 5 or 6 (generate the data set again)"));
+                                       "; expected 5 to 7 (generate the data set again)"));
     EXPECT_THAT(complaint_of_sample(), HasSubstr("its format_version is ")) << "merge calls it";
   }
 }
 
-/// The format before has the checksum in which zeros are hashed as well.
-TEST_F(ShardCheck, ReadsTheFormatBeforeWithItsOwnChecksum) {
+/// The format before has no checksum of labels, and its description_sum covers less.
+TEST_F(ShardCheck, ReadsTheFormatBeforeWithoutSumsOfLabels) {
+  EXPECT_TRUE(check_shard(path_).has_label_sum);
+  make_older(6);
+  EXPECT_EQ(complaint(), "");
+  EXPECT_FALSE(check_shard(path_).has_label_sum);
+}
+
+/// The one before that has the checksum in which zeros are hashed as well.
+TEST_F(ShardCheck, ReadsFormatFiveWithItsOwnChecksum) {
   ContentSum sum(true);
   for (std::int64_t episode = 0; episode < 20; ++episode)
     for (const auto& [name, width] : {std::pair{0U, 2U}, {1U, 3U}, {2U, 2U}, {3U, 36U}})
@@ -106,7 +124,7 @@ TEST_F(ShardCheck, ReadsTheFormatBeforeWithItsOwnChecksum) {
         const std::string bytes = bytes_of_row(episode, name, row, width);
         sum.add(episode, name, row, 1, bytes.size(), bytes.data());
       }
-  change([&](hid_t file) { set(file, "/", "format_version", 5); });
+  make_older(5);
   EXPECT_THAT(complaint(), HasSubstr("the checksum of its numbers is "));
   change([&](hid_t file) {
     const std::uint64_t value = sum.value();
@@ -234,9 +252,51 @@ TEST_F(ShardCheck, FindsADescriptionThatHasChanged) {
     });
     EXPECT_THAT(complaint(), HasSubstr("the checksum of its description is ")) << name;
   }
+  for (const char* const name : {"description_sum", "label_sum"}) {
+    write(whole);
+    change([&](hid_t file) { H5Adelete(file, name); });
+    EXPECT_THAT(complaint(), HasSubstr(name));
+  }
   write(whole);
-  change([](hid_t file) { H5Adelete(file, "description_sum"); });
-  EXPECT_EQ(complaint(), "") << "files of older versions have none";
+  make_older(6);
+  EXPECT_EQ(complaint(), "") << "some files of older versions have none";
+}
+
+/// A flipped bit in any attribute of an episode, in its value as it lies in the file.
+TEST_F(ShardCheck, FindsLabelsThatHaveChanged) {
+  const std::string whole = read();
+  const auto with = [&](const char* object, const char* name) {
+    write(whole);
+    change([&](hid_t file) {
+      const h5::Id owner(H5Oopen(file, object, H5P_DEFAULT)),
+          attribute(H5Aopen(owner.get(), name, H5P_DEFAULT)), type(H5Aget_type(attribute.get()));
+      std::vector<char> bytes(H5Aget_storage_size(attribute.get()));
+      EXPECT_GE(H5Aread(attribute.get(), type.get(), bytes.data()), 0);
+      bytes.back() = static_cast<char>(bytes.back() ^ 1);
+      EXPECT_GE(H5Awrite(attribute.get(), type.get(), bytes.data()), 0);
+    });
+    return complaint();
+  };
+  EXPECT_THAT(with("data/demo_7", "randomized"), HasSubstr("the checksum of its episodes' labels"));
+  for (const char* const name : {"step", "status", "q", "v", "randomized"})
+    EXPECT_THAT(with("failed/episode_17", name), HasSubstr("the checksum of its episodes' labels"))
+        << name;
+  write(whole);
+  change([](hid_t file) { set(file, ".", "simulation_steps", 191); });
+  EXPECT_THAT(complaint(), HasSubstr("the checksum of its episodes' labels"));
+  write(whole);
+  change([](hid_t file) {
+    const h5::Id root(H5Gopen2(file, "/", H5P_DEFAULT));
+    H5Adelete(root.get(), "command");
+    h5::write_attribute(root, "command", "tangere generate another");
+  });
+  EXPECT_THAT(complaint(), HasSubstr("the checksum of its description"));
+  write(whole);
+  change([](hid_t file) {
+    const h5::Id demo(H5Gopen2(file, "data/demo_7", H5P_DEFAULT));
+    h5::write_attribute(demo, "seen by", "a user");
+  });
+  EXPECT_EQ(complaint(), "") << "an attribute of the user's";
 }
 
 TEST_F(ShardCheck, FindsDatasetsThatAreMissingOrShort) {
