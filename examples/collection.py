@@ -3,7 +3,8 @@
 
     PYTHONPATH=build/release/python python examples/collection.py out/touch --episodes 10000
 
-It makes a data set in OUT/NAME for each part of the list below, then OUT/README.md, the card. Run
+It makes a data set in OUT/NAME for each part of the list below, then OUT/README.md, the card. The
+scenes and meshes that the sets name lie in OUT, so OUT may be moved or copied as a whole. Run
 the same command again after a stop: complete shards stay. Processes of a scheduler share the work.
 `--to lerobot` also exports each part into OUT/NAME_lerobot.
 
@@ -15,6 +16,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import re
 import sys
 import time
 from dataclasses import dataclass
@@ -55,7 +57,7 @@ PARTS = (
 # Meshes that two skins with flaws grip and lift at random places, seen by a camera.
 MESHES = {"mug": "mug.obj", "pebble": "pebble.obj"}
 MUG = (
-    ('filename="meshes/mug.obj"', 'filename="{meshes}/{mesh}"'),
+    ('filename="meshes/mug.obj"', 'filename="meshes/{mesh}"'),
     ('axis0="1 0 0" axis1="0 0 1" resolution="24 24"/>',
      'axis0="1 0 0" axis1="0 0 1" resolution="24 24">{flaws}</tactile>'),
     ('axis0="0 0 1" axis1="1 0 0" resolution="24 24"/>',
@@ -112,13 +114,21 @@ def changed(scene: str, pairs: tuple[tuple[str, str], ...], **words: str) -> str
     return text
 
 
+def scene_of_mesh(kind: str) -> str:
+    """The scene of the mug with another mesh, whose body has the name of what it is."""
+    text = changed("mug", MUG, mesh=MESHES[kind], flaws=FLAWS).replace('"mug"', f'"{kind}"')
+    comment = f"""<!-- SPDX-License-Identifier: Apache-2.0
+     Two fingers with flawed skins grip a {kind} at a random place, lift it and hold it. A camera
+     sees it. The scene is mug.xml of Tangere, changed by examples/collection.py. -->"""
+    return re.sub("<!--.*?-->", comment, text, count=1, flags=re.DOTALL)
+
+
 def write_scenes(folder: Path) -> None:
-    """The scenes that are changed, beside the data sets."""
+    """The scenes that are changed, and the meshes that they name, beside the data sets."""
     meshes = tangere.scenes()["mug"].parent / "meshes"
-    scenes = {
-        f"touch_{kind}.xml": changed("mug", MUG, meshes=str(meshes), mesh=mesh, flaws=FLAWS)
-        for kind, mesh in MESHES.items()
-    }
+    scenes = {f"meshes/{mesh}": (meshes / mesh).read_text() for mesh in MESHES.values()}
+    scenes |= {f"touch_{kind}.xml": scene_of_mesh(kind) for kind in MESHES}
+    (folder / "meshes").mkdir(exist_ok=True)
     for kind, (modulus, thickness, kn) in GELS.items():
         words = {"modulus": modulus, "thickness": thickness, "kn": kn}
         scenes[f"touch_gel_{kind}.xml"] = changed("gel_press", GEL, **words)
@@ -148,12 +158,11 @@ def make(folder: Path, episodes: int, seed: int) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     write_scenes(folder)
     for part, count in zip(PARTS, shared(episodes), strict=True):
-        what = str(folder / part.what) if part.what.endswith(".xml") else part.what
         start = time.monotonic()
         done = run_command([
-            "generate", what, "--output", str(folder / part.name), "--episodes", str(count),
+            "generate", part.what, "--output", part.name, "--episodes", str(count),
             "--seed", str(seed), "--compress", "deflate", "--resume", "--quiet", *part.options,
-        ])  # fmt: skip
+        ], folder=folder)  # fmt: skip
         print(f"{part.name}: {count} episodes, {done['bytes'] / 1e6:.1f} MB, "
               f"{time.monotonic() - start:.1f} s", flush=True)  # fmt: skip
 
@@ -182,7 +191,7 @@ def card(folder: Path, license: str) -> str:
             ", ".join(map(str, data.attributes.get("randomized_names", []))) or "starts, goals"
         )
         lines.append(f"- {name}: {numbers}")
-    lines += ["", "## How it was made", ""]
+    lines += ["", "## How it was made", "", "In this folder, which has the scenes and meshes:", ""]
     lines += [f"    {data.command}" for data in sets.values()]
     lines += [
         "",

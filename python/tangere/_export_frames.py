@@ -266,6 +266,20 @@ def unit_and_meaning(episodes: Episodes, key: str) -> tuple[str, str]:
     return "" if unit.endswith("_units") else unit, meanings.get(key, "")
 
 
+def action_units(episodes: Episodes) -> list[str]:
+    """Of the numbers of an action. Data sets of older versions have one unit, of tasks alone."""
+    said = episodes.attributes
+    if "action_units" in said:
+        return [str(unit) for unit in said["action_units"]]
+    return [str(said.get("action_unit", "1"))] * len(said["action_names"])
+
+
+def action_unit(episodes: Episodes) -> str:
+    """In one text: "m", or "m, rad, 1" of numbers that differ."""
+    units = action_units(episodes)
+    return ", ".join(units if len(set(units)) > 1 else units[:1])
+
+
 def names_of(episodes: Episodes, key: str, places: Sequence[int]) -> list[str]:
     """Names of some numbers of q or v."""
     names = [str(name) for name in episodes.attributes[f"{key}_names"]]

@@ -8,13 +8,15 @@ are there and all files are whole:
 
     .lock          held exclusively by a process that is alone or finishes, else shared
     .start         held for a moment by a process that begins or ends
-    .parts/job.json    what the bytes depend on
-    .parts/00003       part 3 is complete; formats keep beside it what `finish` needs of it
-    .parts/00003.sums  sizes and sums of its files
+    .parts/job.json    what the bytes depend on, and sums of the files that were there first
+    .parts/00003       part 3 is complete
+    .parts/00003.npz   what the format's `finish` needs of it, if anything
+    .parts/00003.sums  sizes and sums of its files, and of the one above
     .parts/whole-00002 the numbers of file 2 of the data set have its checksum
 
 A run that was stopped or killed leaves OUTPUT.part. The next one goes on with it if it writes the
-same, and is told to or is one of many processes of a scheduler; otherwise it removes it.
+same, and is told to or is one of many processes of a scheduler; otherwise it removes it. Parts
+whose files no longer have their sums are written again.
 """
 
 from __future__ import annotations
@@ -90,10 +92,11 @@ class Work:
 
     def do(self, task: str) -> None:
         if task.isdecimal():
-            part = int(task)
-            self.format.write(self.folder, part)
-            sums = sums_of(self.folder, self.format.files(part), self.format.by_folder)
-            self._sums_of(task).write_text(json.dumps(sums))
+            try:
+                self.format.write(self.folder, int(task))
+                self._sums_file(task).write_text(json.dumps(self._found(task)))
+            except OSError as error:
+                raise named(error, self.folder) from None
             return
         try:
             _core.check_shard(self.sources[int(task.removeprefix("whole-"))])
@@ -105,15 +108,40 @@ class Work:
 
     def sums(self) -> Sums:
         """Of all files, after `Format.finish`."""
-        parts = [task for task in self.tasks() if task.isdecimal()]
+        parts = [self._stored(task) for task in self.tasks() if task.isdecimal()]
         common = sums_of(self.folder, self.format.common, self.format.by_folder)
-        return joined([*(json.loads(self._sums_of(part).read_text()) for part in parts), common])
+        return joined([*(part["files"] for part in parts), common])
 
     def has_sums(self, task: str) -> bool:
         """Whether what `sums` needs of a task is there. A part of an older version has none."""
-        return not task.isdecimal() or self._sums_of(task).is_file()
+        return not task.isdecimal() or bool(self._stored(task))
 
-    def _sums_of(self, part: str) -> Path:
+    def is_whole(self, task: str) -> bool:
+        """Whether the files of a part that was written are as they were."""
+        return not task.isdecimal() or self._stored(task) == self._found(task)
+
+    def remove(self, task: str) -> None:
+        """Removes the files of a part, so that nothing of them is kept when it is written again."""
+        beside = (f".parts/{task}{end}" for end in ("", ".sums", ".npz"))
+        for name in (*self.format.files(int(task)), *beside):
+            (self.folder / name).unlink(missing_ok=True)
+
+    def _found(self, task: str) -> dict[str, Sums]:
+        files = sums_of(self.folder, self.format.files(int(task)), self.format.by_folder)
+        return {"files": files, "beside": sums_of(self.folder, [f".parts/{task}.npz"], False)}
+
+    def _stored(self, task: str) -> dict[str, Sums]:
+        """What `do` has stored of a part; nothing if that is missing or damaged."""
+        try:
+            said = json.loads(self._sums_file(task).read_text(encoding="utf-8"))
+            return {
+                group: {path: (files, size, total) for path, (files, size, total) in sums.items()}
+                for group, sums in ((group, said[group]) for group in ("files", "beside"))
+            }
+        except (OSError, ValueError, KeyError, TypeError, AttributeError):
+            return {}
+
+    def _sums_file(self, part: str) -> Path:
         return self.folder / f".parts/{part}.sums"
 
 
@@ -128,8 +156,15 @@ def run(
     checksum, InputError if `output` is there and is not to be replaced, or is of another kind, and
     if other processes write something else there.
     """
-    index, count, _ = _core.worker_from_environment()
     folder = Folder(output, format, identity(job), overwrite, sources)
+    try:
+        return _run(folder, resume, workers, progress)
+    except OSError as error:
+        raise named(error, folder.part) from None
+
+
+def _run(folder: Folder, resume: bool, workers: int, progress: Progress | None) -> bool:
+    index, count, _ = _core.worker_from_environment()
     if (resume or count > 1) and folder.is_done():
         folder.remove_old()
         return True
@@ -150,6 +185,9 @@ def run(
 
 def _do(folder: Folder, tasks: list[str], workers: int, progress: Progress | None) -> None:
     work = folder.work
+    for task in tasks:
+        if folder.has(task) and not work.is_whole(task):
+            work.remove(task)
     wanted = [task for task in tasks if not folder.has(task)]
     total = sum(map(work.frames, tasks))
     done = total - sum(map(work.frames, wanted))
@@ -217,6 +255,8 @@ class Folder:
         with open(self.part / ".lock", "w") as lock:
             if not _locked(lock, fcntl.LOCK_EX):
                 raise _core.InputError(f"{self.part} is being written by another process")
+            if resume and self._job() == self._name:
+                self._check_begun()
             try:
                 self.lock = lock.fileno()
                 self._begin(resume)
@@ -238,7 +278,9 @@ class Folder:
         with open(self.part / ".lock", "w") as lock:
             with open(self.part / ".start", "w") as start:
                 fcntl.flock(start, fcntl.LOCK_EX)
-                if self._job() != self._name:
+                if self._job() == self._name:
+                    self._check_begun()
+                else:
                     if not _locked(lock, fcntl.LOCK_EX):
                         raise _core.InputError(
                             f"{self.part} is being written by another process, with other options "
@@ -270,7 +312,10 @@ class Folder:
             raise _core.IoError(f"part {left[0]} of {self.output} was not written")
         self._format.finish(self.part)
         path = self.part / self._format.origin
-        said = json.loads(path.read_text(encoding="utf-8"))
+        try:
+            said = json.loads(path.read_text(encoding="utf-8"))
+        except ValueError as error:
+            raise self._damaged(path, f"it is no JSON ({error})") from None
         new = path.with_name(path.name + ".new")
         new.unlink(missing_ok=True)
         write_json(new, said | {"job": self._name, "stored": stored(self.work.sums())})
@@ -296,12 +341,37 @@ class Folder:
             self._old.rename(self.output)
             self._check_free()
         (self.part / ".parts").mkdir(exist_ok=True)
-        if self._job() != self._name:
-            self._format.begin(self.part)
-            new = self.part / ".parts/job.json.new"
-            new.unlink(missing_ok=True)
-            write_json(new, {"job": self._name})
-            new.replace(self.part / ".parts/job.json")
+        if self._job() == self._name:
+            return
+        self._format.begin(self.part)
+        begun = [
+            str(path.relative_to(self.part))
+            for path in sorted(self.part.rglob("*"))
+            if path.is_file() and path.name not in (".lock", ".start")
+        ]
+        new = self.part / ".parts/job.json.new"
+        new.unlink(missing_ok=True)
+        write_json(new, {"job": self._name, "begun": sums_of(self.part, begun, False)})
+        new.replace(self.part / ".parts/job.json")
+
+    def _check_begun(self) -> None:
+        """Compares the files that were there before any part with their sums."""
+        said = json.loads((self.part / ".parts/job.json").read_text(encoding="utf-8"))
+        for name, (_, size, total) in said.get("begun", {}).items():
+            path = self.part / name
+            ((_, found, now),) = sums_of(self.part, [name], False).values() or ((0, 0, 0),)
+            ended = name == self._format.origin and _job_in(path) == self._name
+            if (found, now) != (size, total) and not ended:
+                raise self._damaged(
+                    path,
+                    f"it has {found} bytes with the checksum {now:08x}; expected {size} with "
+                    f"{total:08x}",
+                )
+
+    def _damaged(self, path: Path, why: str) -> _core.IoError:
+        return _core.IoError(
+            f"'{path}' is damaged: {why}; remove {self.part} and export the data set again"
+        )
 
     def _put_back(self) -> None:
         if self._old.exists() and not self.output.exists():
@@ -342,6 +412,15 @@ def _job_in(path: Path) -> str:
         return str(json.loads(path.read_text(encoding="utf-8"))["job"])
     except (OSError, ValueError, KeyError, TypeError):
         return ""
+
+
+def named(error: OSError, path: Path) -> OSError:
+    """The error with a path, if it names none: writing to a full disk does not say where."""
+    if isinstance(error, _core.IoError) or error.filename or str(path) in str(error):
+        return error
+    if error.errno is None:
+        return OSError(f"{error}: '{path}'")
+    return OSError(error.errno, error.strerror, str(path))
 
 
 def _locked(file: Any, how: int) -> bool:

@@ -141,5 +141,7 @@ def _answer(work: Any, task: str) -> dict[str, Any]:
     except (_core.InputError, _core.IoError) as error:
         return {"error": type(error).__name__, "arguments": [str(error)]}
     except OSError as error:
+        if error.errno is None:
+            return {"error": "OSError", "arguments": [str(error)]}
         named = [str(error.filename)] if error.filename else []
         return {"error": "OSError", "arguments": [error.errno, error.strerror, *named]}

@@ -31,7 +31,9 @@ import numpy as np
 from PIL import Image
 
 from . import _core
-from ._export_frames import Arrays, Frames, is_picture, picture_rows, unit_and_meaning
+from ._export_frames import (
+    Arrays, Frames, action_unit, is_picture, picture_rows, unit_and_meaning
+)  # fmt: skip
 from ._export_ftp1 import joint_places
 from ._export_job import sync, write_json
 
@@ -145,7 +147,7 @@ class UniVtac:
     def _unit(self, name: str) -> str:
         units = {"press_depth": "mm", "marker": "pixels"}
         if name == "action":
-            return str(self.frames.episodes.attributes.get("action_unit", "1"))
+            return action_unit(self.frames.episodes)
         owner, _, reading = name.removeprefix("tactile/").partition("/")
         if reading == "force":
             return unit_and_meaning(self.frames.episodes, owner)[0]

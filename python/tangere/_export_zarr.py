@@ -18,7 +18,7 @@ import numpy as np
 import zarr
 
 from . import _core
-from ._export_frames import Arrays, Frames, unit_and_meaning
+from ._export_frames import Arrays, Frames, action_unit, action_units, unit_and_meaning
 
 _CHUNK_BYTES = 1 << 20  # of a chunk, at most, where a row is smaller
 _PART_BYTES = 1 << 26  # of the numbers of a part
@@ -193,7 +193,8 @@ def attributes_of(frames: Frames) -> dict[str, dict[str, Any]]:
         said[key]["window"] = window
     said["action"] = {
         "names": [str(name) for name in episodes.attributes["action_names"]],
-        "unit": str(episodes.attributes.get("action_unit", "1")),
+        "unit": action_unit(episodes),
+        "units": action_units(episodes),
         "meaning": str(episodes.attributes.get("action_meaning", "controls")),
     }
     return said

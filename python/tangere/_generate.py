@@ -186,12 +186,15 @@ def _converse(
                     # Else the command has stopped, and says why.
 
 
-def run_command(words: Sequence[str], dies_along: bool = False) -> dict[str, Any]:
+def run_command(
+    words: Sequence[str], dies_along: bool = False, folder: Path | None = None
+) -> dict[str, Any]:
     """Runs the command and returns what it says with --json. Raises InputError and IoError as the
-    command does, with its message. dies_along: it is killed if this thread of the caller is."""
+    command does, with its message. dies_along: it is killed if this thread of the caller is.
+    folder: in which it runs; None: that of the caller."""
     run = subprocess.run(
-        [str(command_path()), *words, "--json"],
-        stdin=subprocess.DEVNULL, capture_output=True, text=True,
+        [str(command_path().absolute()), *words, "--json"],
+        stdin=subprocess.DEVNULL, capture_output=True, text=True, cwd=folder,
         preexec_fn=_die_with_parent if dies_along else None,
     )  # fmt: skip
     return _result(run.returncode, run.stdout, run.stderr, words[0])

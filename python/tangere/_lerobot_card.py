@@ -6,7 +6,7 @@ from __future__ import annotations
 import json
 from typing import Any, Sequence
 
-from ._export_frames import Frames, hidden_in_words, names_of, unit_and_meaning
+from ._export_frames import Frames, action_unit, hidden_in_words, names_of, unit_and_meaning
 from ._lerobot_features import STATE, Feature
 from .data import Episodes
 
@@ -78,7 +78,7 @@ def _pictures(features: Sequence[Feature]) -> str:
 def _columns(episodes: Episodes, features: Sequence[Feature]) -> list[str]:
     said = episodes.attributes
     about = {
-        "action": f"{said.get('action_meaning', 'controls')} [{said.get('action_unit', '1')}]",
+        "action": f"{said.get('action_meaning', 'controls')} [{action_unit(episodes)}]",
         "next.reward": "reward of the action",
         "next.done": "true in the last frame of an episode",
         "next.success": "true in the last frame of an episode that ended in success",

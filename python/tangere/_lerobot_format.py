@@ -11,7 +11,7 @@ import numpy as np
 import pyarrow as pa
 
 from . import _core, _lerobot_video
-from ._export_frames import Frames, unit_and_meaning
+from ._export_frames import Frames, action_unit, unit_and_meaning
 from ._export_job import sync, write_json, write_text
 from ._lerobot_card import card
 from ._lerobot_features import BOOKKEEPING, Feature, Pictures, Touch, features_of
@@ -231,9 +231,9 @@ class LeRobot:
         }
 
     def _units(self) -> dict[str, str]:
-        """Of columns whose numbers have one unit."""
+        """Of columns whose numbers have one unit, and of the action."""
         episodes = self.frames.episodes
-        units = {"action": str(episodes.attributes.get("action_unit", "1"))}
+        units = {"action": action_unit(episodes)}
         for feature in self.features:
             found = {unit_and_meaning(episodes, key)[0] for key in feature.keys}
             if feature.name.startswith("observation.") and not feature.is_picture:

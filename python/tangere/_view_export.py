@@ -54,6 +54,7 @@ def page(
         data, out = Path(folder) / "export.h5", Path(folder) / "page.html"
         moved = _write(data, path, export, chosen)
         words = ["view", str(data), "-o", str(out), "--frames", str(frames)]
+        scene = scene or _scene_beside(path, export)
         words += ["--episodes", str(len(chosen)), *(["--scene", scene] if scene else [])]
         said = run_command(words)
         text = out.read_text(encoding="utf-8").replace(json.dumps(str(data)), json.dumps(str(path)))
@@ -61,6 +62,23 @@ def page(
     old, new = (re.compile(r'"notes":\s*\[[^\]]*\]'), json.dumps(said["notes"]))
     text = old.sub(lambda _: f'"notes":{new}', text, count=1)
     return text, said | {"input": str(path), "bytes": len(text.encode())}
+
+
+def _scene_beside(path: Path, export: _Export) -> str:
+    """The file of the scene that lies in the export or beside it, as the command names it; none if
+    there is none with the same text. Its meshes are then beside it, wherever the folder was moved.
+    """
+    named = re.match("tangere generate (.*?) --episodes ", export.command)
+    if named is None:
+        return ""
+    for folder in (path, path.absolute().parent):
+        file = folder / Path(named[1]).name
+        try:
+            if file.is_file() and file.read_text(encoding="utf-8") == export.note["text"]:
+                return str(file)
+        except ValueError:  # no text
+            pass
+    return ""
 
 
 def _notes(

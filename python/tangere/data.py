@@ -51,9 +51,9 @@ class Episodes:
         one = self.path.is_file()
         self.files = [self.path] if one else sorted(self.path.glob("shard-*.h5"))  #: that are read
         if not self.files:
-            raise _core.InputError(
-                f"{self.path}: no shard-*.h5; expected a folder of `tangere generate`, or one of "
-                "its files"
+            what = "no shard-*.h5" if self.path.exists() else "it does not exist"
+            raise _core.IoError(
+                f"{self.path}: {what}; expected a folder of `tangere generate`, or one of its files"
             )
         self.masks = self.path if one else self.path / "robomimic.hdf5"
         self.names: list[str] = []  # demo_0, demo_1 … in order
@@ -66,10 +66,10 @@ class Episodes:
             with _damage_named(shard), h5py.File(shard, "r") as file:
                 if number == 0:
                     if "dataset_shards" not in file.attrs:
-                        raise _core.InputError(f"{shard} is no file of `tangere generate`")
+                        raise _core.IoError(f"{shard} is no file of `tangere generate`")
                     expected = 1 if one else int(file.attrs["dataset_shards"])
                     if expected != len(self.files):
-                        raise _core.InputError(
+                        raise _core.IoError(
                             f"{self.path} has {len(self.files)} shards of {expected}; expected "
                             "all, see `tangere generate --resume`"
                         )
@@ -133,7 +133,7 @@ class Episodes:
     def mask(self, name: str) -> list[int]:
         """The episodes of a mask of robomimic.hdf5: train, valid, success …"""
         if not self.masks.exists():
-            raise _core.InputError(
+            raise _core.IoError(
                 f"{self.masks} is missing; expected a merged data set (tangere merge)"
             )
         with h5py.File(self.masks, "r") as file:
@@ -141,6 +141,7 @@ class Episodes:
             if name not in known:
                 raise _core.InputError(f"{self.masks}: no mask {name!r}; it has {known}")
             names = [n.decode() for n in file["mask"][name][()]]
+        _core.check_mask(self.masks, name)
         lost = [n for n in names if n not in self._index]
         if lost:
             raise _core.InputError(

@@ -4,7 +4,9 @@
 from __future__ import annotations
 
 import importlib.util
+import os
 import re
+import subprocess
 import sys
 from pathlib import Path
 
@@ -13,6 +15,7 @@ import pytest
 
 import tangere
 from tangere.data import Episodes
+from tangere.export import export
 
 PATH = Path(__file__).parents[2] / "examples/collection.py"
 
@@ -45,17 +48,27 @@ def test_all_parts_are_made_and_named_by_the_card(collection, command, tmp_path,
         fields.append(touched[0]["left_finger"])
         assert np.abs(fields[-1]).max() > 0.02 and np.ptp(touched[0]["eye.rgb"]) > 50
         varied = set(touched.attributes["randomized_names"])
-        assert {"body mug density", "tactile left_finger kn"} <= varied
+        assert {f"body {mesh} density", "tactile left_finger kn"} <= varied
     assert np.abs(fields[0] - fields[1]).max() > 0.02  # other surfaces
     forces = [
         np.abs(Episodes(tmp_path / f"touch_gel_{kind}")[0]["gel"]).max()
         for kind in collection.GELS
     ]
     assert 0 < forces[0] < forces[1] < forces[2]  # a softer gel gives way
+    export(tmp_path / "touch_pebble", tmp_path / "pebble_lerobot", "lerobot", workers=1)
     before = (tmp_path / "box_pushing/shard-00000.h5").stat().st_mtime_ns
     assert collection.main() == 0  # nothing is left to do
     assert (tmp_path / "box_pushing/shard-00000.h5").stat().st_mtime_ns == before
     assert re.findall("Licence: (.*?)[.] ", (tmp_path / "README.md").read_text()) == ["CC0-1.0"]
+    text = (tmp_path / "touch_pebble.xml").read_text()
+    assert "mug" not in text.replace("mug.xml of Tangere", "") and str(tmp_path) not in card + text
+    moved = tmp_path.rename(tmp_path.with_name("moved"))  # as to another machine
+    environment = os.environ | {"TANGERE_PYTHON": sys.executable}
+    for name in ("touch_mug", "touch_pebble", "touch_gel_soft", "pebble_lerobot"):
+        words = [command, "view", moved / name, "-o", moved / f"{name}.html"]
+        run = subprocess.run(words, capture_output=True, text=True, env=environment)
+        assert run.returncode == 0, run.stderr
+    export(moved / "touch_mug", moved / "mug.csv", "csv")
 
 
 def test_the_episodes_are_those_asked_for(collection, monkeypatch, capsys):

@@ -181,7 +181,7 @@ def test_a_missing_shard_is_told(generate):
     folder = generate("dummy", "--episodes", "32", "--shards", "2", "--no-merge")
     assert len(Episodes(folder)) == 32
     (folder / "shard-00001.h5").unlink()
-    with pytest.raises(tangere.InputError, match="1 shards of 2"):
+    with pytest.raises(tangere.IoError, match="1 shards of 2"):
         Episodes(folder)
 
 
@@ -195,7 +195,7 @@ def test_mistakes_are_told(pushes, tmp_path):
     ]:
         with pytest.raises(tangere.InputError, match=message):
             Windows(pushes, **arguments)
-    with pytest.raises(tangere.InputError, match="no shard"):
+    with pytest.raises(tangere.IoError, match="no shard"):
         Windows(tmp_path)
     with pytest.raises(tangere.InputError, match="no 'grad_actions'"):
         Windows(pushes, gradients=["grad_actions"])[0]

@@ -8,6 +8,7 @@ import io
 import json
 import os
 import re
+import resource
 import signal
 import subprocess
 import sys
@@ -288,6 +289,65 @@ def test_a_run_that_was_stopped_or_killed_is_resumed(pushes, tmp_path, monkeypat
         exports.export(pushes, out, "zarr", resume=True, privileged=True)
 
 
+@pytest.fixture
+def unfinished(pushes, tmp_path, monkeypatch):
+    """A run whose parts are all there, and that was stopped before it joined them: its folder."""
+    many_parts(monkeypatch)
+
+    def stopped(to, options):
+        folder = tmp_path / "out.part"
+        with monkeypatch.context() as patch:
+            patch.setattr(_export_job.Folder, "finish", stop)
+            with pytest.raises(KeyboardInterrupt):
+                exports.export(pushes, tmp_path / "out", to, workers=1, **options)
+        assert len(list((folder / ".parts").glob("*.sums"))) > 1
+        return folder
+
+    return stopped
+
+
+def stop(folder):
+    raise KeyboardInterrupt
+
+
+def flip_middle(path):
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 4
+    path.write_bytes(data)
+
+
+@pytest.mark.parametrize(
+    "to, name, change",
+    [
+        ("zarr", "data/tactile/1.0.0.0", flip_middle),
+        ("zarr", "data/tactile/1.0.0.0", lambda path: path.unlink()),
+        ("zarr", ".parts/00001.sums", lambda path: path.write_text("{")),
+        ("lerobot", "data/chunk-000/file-001.parquet", flip_middle),
+        ("lerobot", ".parts/00001.npz", lambda path: os.truncate(path, 100)),
+        ("univtac", "hdf5/1.hdf5", lambda path: os.truncate(path, 100)),
+    ],
+)
+def test_a_part_that_has_changed_is_written_again(unfinished, pushes, tmp_path, to, name, change):
+    given = {"lerobot": {"file_megabytes": 0.1}, "univtac": {"joints": "hand_slide.axis0"}}
+    options = given.get(to, {})
+    exports.export(pushes, tmp_path / "whole", to, workers=1, **options)
+    folder = unfinished(to, options)
+    change(folder / name)
+    exports.export(pushes, tmp_path / "out", to, resume=True, workers=1, **options)
+    assert same_files(tmp_path / "out", tmp_path / "whole")
+
+
+@pytest.mark.parametrize("name", [".zattrs", "data/tactile/.zarray", "meta/episode_ends/0"])
+def test_a_description_that_has_changed_is_named(unfinished, pushes, tmp_path, capsys, name):
+    path = unfinished("zarr", {}) / name
+    os.truncate(path, path.stat().st_size // 2)
+    words = [str(pushes), str(tmp_path / "out"), "--to", "zarr", "--quiet"]
+    assert exports.main([*words, "--resume"]) == 3
+    said = capsys.readouterr().err
+    assert f"'{path}' is damaged: it has" in said and "out.part and export the data set" in said
+    assert exports.main(words) == 0
+
+
 def test_processes_of_a_scheduler_share_the_work(pushes, tmp_path, monkeypatch):
     many_parts(monkeypatch)
     exports.export(pushes, tmp_path / "whole", "zarr")
@@ -338,6 +398,21 @@ def test_a_process_that_does_not_start_is_told(pushes, tmp_path, monkeypatch):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize("to, workers", [("lerobot", 1), ("zarr", 1), ("zarr", 2), ("csv", 1)])
+def test_a_full_disk_is_named(pushes, command, tmp_path, to, workers):
+    def limit():  # of a file, which a full disk is for one that writes
+        resource.setrlimit(resource.RLIMIT_FSIZE, (2000, 2000))
+
+    words = [sys.executable, "-m", "tangere.export", pushes, tmp_path / "out", "--to", to]
+    run = subprocess.run(
+        [*words, "--workers", str(workers)] if to != "csv" else words,
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(p for p in sys.path if p)},
+        preexec_fn=limit, capture_output=True, text=True,
+    )  # fmt: skip
+    assert run.returncode == 3 and str(tmp_path / "out") in run.stderr, run.stderr
+    assert not list(tmp_path.iterdir())
+
+
 def test_a_folder_that_is_no_export_keeps_its_files(pushes, tmp_path):
     mine = tmp_path / "out.part"
     mine.mkdir()
@@ -385,6 +460,7 @@ def test_csv_is_that_of_the_command(pushes, command, tmp_path):
     words = [command, "export", pushes, tmp_path / "command.csv", "--to", "csv"]
     subprocess.run(words, check=True, capture_output=True)
     assert filecmp.cmp(tmp_path / "python.csv", tmp_path / "command.csv", shallow=False)
+    assert filecmp.cmp(tmp_path / "python.csv.json", tmp_path / "command.csv.json", shallow=False)
     assert done.frames == 2000 and done.complete
 
 
@@ -392,8 +468,12 @@ def test_a_table_names_the_readings_of_a_window(generate, command, tmp_path):
     data = generate(str(tangere.scenes()["rolling_ball_small"]), "--episodes", "1", "--steps", "60",
                     "--every", "20", "--record", "q,pad.sum/5")  # fmt: skip
     exports.export(data, tmp_path / "out.csv", "csv")
-    title, names, *lines = (tmp_path / "out.csv").read_text().splitlines()
-    assert title.endswith(", seed 0, 1 episodes, 3 rows") and len(lines) == 3
+    names, *lines = (tmp_path / "out.csv").read_text().splitlines()
+    said = json.loads((tmp_path / "out.csv.json").read_text())
+    assert (said["episodes"], said["frames"], said["seed"]) == (1, 3, "0") and len(lines) == 3
+    units = dict(zip(said["columns"], said["units"], strict=True))
+    assert list(units) == names.split(",") and units["q/pad_joint.x"] == "m"
+    assert [units[f"pad.sum[-3]/{k}"] for k in range(6)] == ["N"] * 3 + ["m"] * 3
     columns = dict(zip(names.split(","), np.array([line.split(",") for line in lines], float).T))
     window = stored(data, "obs/pad.sum")  # (rows, 4 readings, 6)
     assert window.shape == (3, 4, 6)
@@ -402,6 +482,62 @@ def test_a_table_names_the_readings_of_a_window(generate, command, tmp_path):
             found = columns[f"pad.sum[{reading - 3}]/{k}"]
             np.testing.assert_allclose(found, window[:, reading, k], rtol=1e-6)
     assert "q/pad_joint.x" in columns and not any("[-4]" in name for name in columns)
+
+
+def test_a_table_of_any_name_is_known(pushes, command, tmp_path):
+    table, facts = tmp_path / "table", tmp_path / "table.json"
+
+    def run(*words):
+        done = subprocess.run([command, *words], capture_output=True, text=True)
+        return done.returncode, done.stdout + done.stderr
+
+    exports.export(pushes, table, "csv")
+    code, text = run("info", table)
+    assert code == 0 and "actions/drive[0] () number [1]" in text
+    assert "goal/1 () number [m]" in text and "goal/2 () number [rad]" in text
+    assert "generate box_pushing" in text and "a frame lasts 0.025 s" in text
+    assert run("validate", table)[0] == 0
+    flip_middle(table)
+    code, text = run("validate", table)
+    assert code == 3 and "the checksum of its bytes is" in text
+    exports.export(pushes, table, "csv", overwrite=True)
+    assert run("validate", table)[0] == 0
+    facts.unlink()  # a table alone
+    code, text = run("validate", table)
+    assert code == 0 and "table.json' is missing" in text
+    facts.write_text("{}")
+    with pytest.raises(tangere.InputError, match="table.json' is not what"):
+        exports.export(pushes, table, "csv", overwrite=True)
+    table.unlink()
+    with pytest.raises(tangere.IoError, match="table.json' exists already"):
+        exports.export(pushes, table, "csv")
+    assert facts.read_text() == "{}" and not table.exists()
+
+
+@pytest.fixture(scope="module")
+def mugs(generate):
+    return generate(str(tangere.scenes()["mug"]), "--episodes", "1", "--steps", "20", "--every",
+                    "5", "--record", "q,left_finger.sum,left_finger")  # fmt: skip
+
+
+@pytest.mark.parametrize("to", ["lerobot", "zarr", "ftp1", "univtac", "csv"])
+def test_actions_have_the_units_of_the_motors(mugs, command, tmp_path, to):
+    exports.export(mugs, tmp_path / "out", to, **({} if to == "csv" else {"workers": 1}))
+    run = subprocess.run([command, "info", tmp_path / "out", "--json"], capture_output=True)
+    units = {array["name"]: array["unit"] for array in json.loads(run.stdout)["arrays"]}
+    found = {name: unit for name, unit in units.items() if "action" in name}
+    assert set(found.values()) == {"m"} and len(found) == (3 if to == "csv" else 1)
+
+
+@pytest.mark.parametrize("to", ["lerobot", "zarr", "ftp1", "univtac", "csv"])
+def test_input_that_is_missing_has_one_exit_code(pushes, command, tmp_path, to):
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "other.h5").write_bytes(b"")
+    environment = os.environ | {"TANGERE_PYTHON": sys.executable}
+    for name in ("none", "empty", "other.h5"):
+        words = [command, "export", tmp_path / name, tmp_path / "out", "--to", to]
+        run = subprocess.run(words, capture_output=True, text=True, env=environment)
+        assert run.returncode == 3 and str(tmp_path / name) in run.stderr, run.stderr
 
 
 def test_quiet_prints_errors_alone(pushes, command, tmp_path):

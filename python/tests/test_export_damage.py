@@ -12,6 +12,7 @@ import subprocess
 import sys
 
 import h5py
+import numpy as np
 import pytest
 
 import tangere
@@ -65,8 +66,16 @@ def without_actions(shard):
         del file["data"][next(iter(file["data"]))]["actions"]
 
 
+def flip_label(shard):
+    with h5py.File(shard, "r+") as file:
+        demo = next(iter(file["data"].values()))
+        demo.attrs["success"] = np.int8(1 - demo.attrs["success"])
+
+
+LABELS = r"checksum of its episodes' labels \(.*\) is [0-9a-f]{16}; expected [0-9a-f]{16}"
 CHANGES = [
     (flip_number, SUMS),
+    (flip_label, LABELS),
     (shorten, "truncated"),
     (without_actions, "'actions'"),
 ]
@@ -122,6 +131,58 @@ def test_a_damaged_merged_file_is_refused(damaged, tmp_path):
     data = damaged(flip_number) / "robomimic.hdf5"
     with pytest.raises(tangere.IoError, match=f"robomimic.hdf5' is damaged: the {SUMS}"):
         exports.export(data, tmp_path / "out", "zarr", workers=1)
+
+
+@pytest.fixture(scope="module")
+def mixed(generate):
+    return generate("box_pushing", "--episodes", "20", "--seed", "5", "--mix", "random=0.3")
+
+
+@pytest.mark.parametrize("name", ["return", "terminated", "success", "policy", "touching"])
+def test_a_changed_label_of_an_episode_is_found(mixed, command, tmp_path, name):
+    data = tmp_path / "set"
+    shutil.copytree(mixed, data)
+    with h5py.File(data / "shard-00000.h5", "r+") as file:
+        attributes = file["data/demo_7"].attrs
+        old = attributes[name]
+        attributes[name] = type(old)(old + 1 if name in ("return", "touching") else 1 - old)
+    run = subprocess.run([command, "validate", data], capture_output=True, text=True)
+    assert run.returncode == 3 and "shard-00000.h5: " in run.stderr
+    assert name == "touching" or re.search(LABELS, run.stderr)
+
+
+def test_masks_and_merged_files_are_validated(generate, command, tmp_path):
+    data = tmp_path / "set"
+    whole = generate("box_pushing", "--episodes", "20", "--seed", "5")
+    shutil.copytree(whole, data)
+    merged = data / "robomimic.hdf5"
+
+    def validate(where=data):
+        run = subprocess.run([command, "validate", where], capture_output=True, text=True)
+        assert run.returncode in (0, 3), run.stderr
+        return run.stderr
+
+    assert validate() == ""
+    with h5py.File(merged, "r+") as file:  # a mask of the user's is none of ours
+        file["mask/mine"] = np.asarray([b"demo_3"])
+        del file["mask/valid"]
+        file["mask/valid"] = np.asarray([b"demo_1"])
+    assert validate() == "" and len(Episodes(data).mask("mine")) == 1
+    with h5py.File(merged, "r+") as file:
+        names = file["mask/train"][()]
+        names[0] = b"demo_1"
+        file["mask/train"][()] = names
+    assert "the checksum of the names in mask/train is" in validate()
+    assert "the checksum of the names in mask/train is" in validate(merged)
+    with pytest.raises(tangere.IoError, match="the checksum of the names in mask/train is"):
+        Episodes(data).mask("train")
+    shutil.copy(whole / "robomimic.hdf5", merged)
+    shorten(merged)
+    assert "robomimic.hdf5: " in validate() and "truncated" in validate()
+    shutil.copy(whole / "robomimic.hdf5", merged)
+    (view,) = data.rglob("main_data.hdf5")
+    shorten(view)
+    assert "main_data.hdf5: " in validate() and "truncated" in validate()
 
 
 def test_one_episode_of_a_table_needs_its_own_shard_alone(damaged, command, tmp_path):
@@ -192,8 +253,8 @@ DAMAGE = [
     ("univtac", "metadata.json", edit('"frames": 2000', '"frames": 1990'),
      "its episodes have 2000 steps; expected 1990"),
     ("univtac", "metadata.json", edit('"bytes": [', '"bytes": [7,'), "lists of 'stored' differ"),
-    ("csv", "", drop_last_row, "it has 1999 rows of 20 episodes; expected 2000 of 20, as its"),
-    ("csv", "", end_in_a_number, "line 2002 does not end"),
+    ("csv", "", drop_last_row, "it has 1999 rows of 20 episodes; expected 2000 of 20, as '"),
+    ("csv", "", end_in_a_number, "line 2001 does not end"),
 ]  # fmt: skip
 
 
@@ -201,6 +262,8 @@ DAMAGE = [
 def test_damage_of_an_export_is_found(sets, command, tmp_path, to, name, change, message):
     copy = tmp_path / f"out.{to}"
     (shutil.copytree if sets[to].is_dir() else shutil.copyfile)(sets[to], copy)
+    if to == "csv":
+        shutil.copyfile(f"{sets[to]}.json", f"{copy}.json")
     change(copy / name if name else copy)
     environment = os.environ | {"TANGERE_PYTHON": sys.executable}
     for words in (["info", copy], ["view", copy, "-o", tmp_path / "page.html"], ["validate", copy]):
@@ -233,6 +296,24 @@ def test_flipped_bytes_are_found_by_reading_all(sets, command, tmp_path, to, nam
     path = copy / (name.rpartition("/")[0] if to in ("zarr", "ftp1") else name)
     assert code == 3 and len(said["problems"]) == 1
     assert said["error"].startswith(f"'{path}' is damaged: the checksum of its bytes is ")
+
+
+@pytest.mark.parametrize("to, name", [
+    ("lerobot", "data/chunk-000/file-001.parquet"), ("lerobot", "meta/episodes/more.parquet"),
+    ("zarr", "meta/mine/0"), ("univtac", "hdf5/20.hdf5"),
+])  # fmt: skip
+def test_a_file_that_is_not_of_the_export_is_found(sets, command, tmp_path, to, name):
+    copy = tmp_path / "out"
+    shutil.copytree(sets[to], copy)
+    (copy / "notes.txt").write_text("mine")
+    words = [command, "validate", copy]
+    assert subprocess.run(words, capture_output=True).returncode == 0
+    (copy / name).parent.mkdir(exist_ok=True)
+    (copy / name).write_bytes(b"more")
+    (copy / "data").mkdir(exist_ok=True)
+    (copy / "data/.cache").write_bytes(b"a tool's")
+    run = subprocess.run(words, capture_output=True, text=True)
+    assert run.returncode == 3 and f"'{copy / name}' is not a file of this export" in run.stderr
 
 
 def test_an_export_of_an_older_version_has_no_sums(sets, command, tmp_path):

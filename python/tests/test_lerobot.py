@@ -288,15 +288,16 @@ def test_names_that_mean_something_else_are_refused(pushes, tmp_path, capsys):
 
 
 def test_the_command_tells_mistakes(tmp_path, capsys, pushes):
-    for arguments, message in [
-        ([str(tmp_path), "out"], "no shard-"),
-        ([str(pushes), str(tmp_path / "out"), "--fps", "0"], "fps 0"),
-        ([str(pushes / "minari"), "out"], "no shard-"),
+    for arguments, code, message in [
+        ([str(tmp_path), "out"], 3, "no shard-"),
+        ([str(tmp_path / "none"), "out"], 3, "it does not exist"),
+        ([str(pushes), str(tmp_path / "out"), "--fps", "0"], 2, "fps 0"),
+        ([str(pushes / "minari"), "out"], 3, "no shard-"),
     ]:
-        assert lerobot.main(arguments) == 2
+        assert lerobot.main(arguments) == code
         assert message in capsys.readouterr().err
     not_ours = tmp_path / "other.h5"
     with h5py.File(not_ours, "w"):
         pass
-    assert lerobot.main([str(not_ours), str(tmp_path / "out")]) == 2
+    assert lerobot.main([str(not_ours), str(tmp_path / "out")]) == 3
     assert "no file of `tangere generate`" in capsys.readouterr().err
