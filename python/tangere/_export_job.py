@@ -153,8 +153,8 @@ def run(
     one that ends last completes it.
 
     `sources`: files of the data set. Raises IoError if the numbers of one of them do not have its
-    checksum, InputError if `output` is there and is not to be replaced, or is of another kind, and
-    if other processes write something else there.
+    checksum, and if `output` is there and is not to be replaced; InputError if it is of another
+    kind, and if other processes write something else there.
     """
     folder = Folder(output, format, identity(job), overwrite, sources)
     try:
@@ -177,7 +177,7 @@ def _run(folder: Folder, resume: bool, workers: int, progress: Progress | None) 
         with folder.shared():
             _do(folder, folder.work.tasks()[index::count], workers, progress)
         return folder.finish_if_last()
-    except (FileNotFoundError, _core.InputError):
+    except (FileNotFoundError, _core.InputError, _core.IoError):
         if folder.is_done():  # another process has completed it meanwhile
             return True
         raise
@@ -399,7 +399,9 @@ class Folder:
     def _check_free(self) -> None:
         if self.output.exists() or self.output.is_symlink():
             if not self._overwrite:
-                raise _core.InputError(f"{self.output} exists; expected a new folder, or overwrite")
+                raise _core.IoError(
+                    f"{self.output} exists already; expected a new folder, or --overwrite"
+                )
             if not self._is_whole(self.output):
                 raise _core.InputError(
                     f"{self.output} is no {self._format.kind}; it is not overwritten"

@@ -327,7 +327,7 @@ def main(arguments: Sequence[str] | None = None, prog: str = "tangere view") -> 
 
     out = Path(given.output)
     if out.exists() and not given.overwrite:
-        return fail(2, f"'{out}' exists; expected another name, or --overwrite")
+        return fail(3, f"'{out}' exists already; expected another name, or --overwrite")
     try:
         text, said = page(
             given.input, episode=given.episode, episodes=given.episodes, frames=given.frames,

@@ -220,7 +220,7 @@ def test_nothing_half_written_gets_the_name(pushes, spoil, tmp_path, monkeypatch
     assert [path.name for path in tmp_path.iterdir()] == ["damaged"]
     lerobot.export(pushes, out)
     before = sorted(out.rglob("*"))
-    with pytest.raises(tangere.InputError, match="exists"):
+    with pytest.raises(tangere.IoError, match="exists already"):
         lerobot.export(pushes, out)
     with pytest.raises(tangere.InputError, match="demo_7"):
         lerobot.export(copy, out, overwrite=True)
@@ -236,7 +236,7 @@ def test_nothing_half_written_gets_the_name(pushes, spoil, tmp_path, monkeypatch
         lerobot.export(copy, out, overwrite=True)
     assert (out / "meta/info.json").is_file() and not (tmp_path / "out.old.part").exists()
     out.rename(tmp_path / "out.old.part")
-    with pytest.raises(tangere.InputError, match="exists"):
+    with pytest.raises(tangere.IoError, match="exists already"):
         lerobot.export(pushes, out)
     assert (out / "meta/info.json").is_file()
     half = tmp_path / "out.old.part"  # a run that was killed while it removed the old one

@@ -153,7 +153,7 @@ def test_the_command_makes_the_page(pushes, command, tmp_path):
     assert said["notes"][0] == "The first 3 of 20 episodes."
     assert block(page.read_text())["notes"] == said["notes"]
     before = page.read_bytes()
-    assert run()[0] == 2 and "exists; expected another name" in run()[2]
+    assert run()[0] == 3 and "exists already; expected another name" in run()[2]
     assert page.read_bytes() == before
     code, out, err = run("--overwrite", "--episode", "7")
     assert code == 0 and "1 episodes, 101 frames" in out, err
