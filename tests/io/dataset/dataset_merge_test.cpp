@@ -15,6 +15,7 @@
 #include "io/dataset/shard_check.hpp"
 #include "io/hdf5/h5.hpp"
 #include "io/hdf5/h5_listing.hpp"
+#include "tests/io/older_file.hpp"
 #include "tests/io/synthetic_episodes.hpp"
 
 namespace tangere {
@@ -131,14 +132,17 @@ TEST(DatasetMerge, LeavesOutWhatFailedAndNumbersEpisodesForMinari) {
 /// Unknown is not 0.
 TEST(DatasetMerge, HasNoCountsOfStepsWhereAShardHasNone) {
   const Folder folder;
-  const DatasetFiles dataset = write_with_gaps(folder, true, "none");
-  change(dataset.files[1], [](hid_t file) { H5Adelete(file, "simulation_steps"); });
+  const std::vector<std::string> files = write_with_gaps(folder, true, "none").files;
+  for (const std::string& file : files) tangere::testing::make_older(file, 6);
+  change(files[1], [](hid_t file) { H5Adelete(file, "simulation_steps"); });
+  const DatasetFiles dataset = find_dataset(folder / "set");
   const MergeResult result = merge_dataset(dataset, {});
   EXPECT_EQ(result.steps, std::nullopt);
   EXPECT_EQ(stored_steps(h5::open_file(result.file)), std::nullopt);
   EXPECT_EQ(summarise(dataset).steps, std::nullopt);
   const DatasetReport report = examine_dataset(dataset);
   EXPECT_EQ(report.steps, std::nullopt);
+  EXPECT_FALSE(report.has_label_sums);
   EXPECT_THAT(report.problems, IsEmpty());
 }
 

@@ -14,6 +14,7 @@
 #include "io/hdf5/h5.hpp"
 #include "io/trajectory/trajectory_file.hpp"
 #include "tests/files.hpp"
+#include "tests/io/older_file.hpp"
 #include "tests/io/synthetic_episodes.hpp"
 
 namespace tangere {
@@ -67,14 +68,6 @@ class ShardCheck : public ::testing::Test {
     how(file);
     H5Fclose(file);
   }
-  /// As versions before labels had a checksum wrote it.
-  void make_older(std::int64_t version) const {
-    change([&](hid_t file) {
-      set(file, "/", "format_version", version);
-      H5Adelete(file, "label_sum");
-      H5Adelete(file, "description_sum");
-    });
-  }
   static void set(hid_t file, const char* object, const char* name, std::int64_t value) {
     const hid_t owner = H5Oopen(file, object, H5P_DEFAULT),
                 attribute = H5Aopen(owner, name, H5P_DEFAULT);
@@ -110,7 +103,7 @@ TEST_F(ShardCheck, RefusesEarlierFormats) {
 /// The format before has no checksum of labels, and its description_sum covers less.
 TEST_F(ShardCheck, ReadsTheFormatBeforeWithoutSumsOfLabels) {
   EXPECT_TRUE(check_shard(path_).has_label_sum);
-  make_older(6);
+  testing::make_older(path_, 6);
   EXPECT_EQ(complaint(), "");
   EXPECT_FALSE(check_shard(path_).has_label_sum);
 }
@@ -124,7 +117,7 @@ TEST_F(ShardCheck, ReadsFormatFiveWithItsOwnChecksum) {
         const std::string bytes = bytes_of_row(episode, name, row, width);
         sum.add(episode, name, row, 1, bytes.size(), bytes.data());
       }
-  make_older(5);
+  testing::make_older(path_, 5);
   EXPECT_THAT(complaint(), HasSubstr("the checksum of its numbers is "));
   change([&](hid_t file) {
     const std::uint64_t value = sum.value();
@@ -258,7 +251,7 @@ TEST_F(ShardCheck, FindsADescriptionThatHasChanged) {
     EXPECT_THAT(complaint(), HasSubstr(name));
   }
   write(whole);
-  make_older(6);
+  testing::make_older(path_, 6);
   EXPECT_EQ(complaint(), "") << "some files of older versions have none";
 }
 
