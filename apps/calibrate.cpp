@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
@@ -20,7 +21,7 @@
 #include "apps/run_options.hpp"
 #include "apps/text_output.hpp"
 #include "engine/base/error.hpp"
-#include "tasks/calibration/press_doubts.hpp"
+#include "tasks/calibration/press_warnings.hpp"
 
 namespace tangere::apps {
 namespace {
@@ -28,10 +29,13 @@ namespace {
 // Where the layout has none.
 constexpr double kUsualFriction = 0.6, kUsualShearShare = 0.4, kUsualRelaxation = 1e-3;
 constexpr int kMostKnots = 100;
+/// Numbers of a recording, which no layout has.
+constexpr std::array kRecordingNumbers = {kZero, kForceZero, kPlaceX,     kPlaceY,
+                                          kLag,  kSlider,    kSliderForce};
 
 struct CalibrateArguments {
   std::string recording, sensor, output, check, pictures, channels, loads, unit;
-  std::vector<std::string> numbers;
+  std::vector<std::string> numbers, columns;
   Indenter indenter;
   std::optional<int> table;
   std::optional<double> hold_out, pixel;
@@ -88,6 +92,7 @@ int run_channels(const CalibrateArguments& a, const Console& console) {
           {"--table", a.table.has_value()},
           {"--score", a.score},
           {"--friction", a.friction},
+          {"--column", !a.columns.empty()},
           {"--fit", !a.numbers.empty()}},
          "a fit of the skin's numbers of its own, before");
   check_indenter(a);
@@ -104,6 +109,7 @@ struct Fitted {
   bool has_table = false;  ///< of its own, which stays
   SkinNumbers start;       ///< attributes that can be fitted
   SkinNumbers own;         ///< of these, those that the layout has
+  std::size_t points = 0;  ///< of the sensor
 };
 
 /// Sets the attributes that can be fitted, as the layout has them, where it has any.
@@ -176,9 +182,11 @@ Fitted read_fitted(const CalibrateArguments& a) {
                 false,
                 false,
                 {},
-                {}};
+                {},
+                0};
   const Scene scene = press_scene(fitted.layout, a.indenter);
   const TactileDescription& d = scene.sensors[0];
+  fitted.points = tactile_points(d).size();
   if (fitted.knots > 0) prepare_for_table(fitted, d);
   set_start(d, fitted);
   if (fitted.knots > 0) {
@@ -199,29 +207,51 @@ void name_as_measured(LayoutFile& layout) {
   layout.set("name", name);
 }
 
-/// The layout with what was fitted, and how far the forces of this very text are off.
+/// The rows that --score compares.
+std::vector<int> scored_rows(const PressRecording& recording, bool relaxes) {
+  std::vector<int> turns, rows;
+  if (relaxes) turns = recording.turns();
+  for (int row = 0; row < int(recording.rows()); ++row)
+    if (!std::ranges::binary_search(turns, row)) rows.push_back(row);
+  return rows;
+}
+
+/// The layout with what was fitted, and how far the forces of this very text are off, as --score
+/// says.
 struct Written {
   LayoutFile layout;
   PressError error;
 };
 
-/// Returns the layout with the fitted attributes, whose forces are compared with the zeros and the
-/// lag of the recording, and without a slider, which no layout has.
+/// Returns the layout with the fitted attributes. It is scored as it will be read: without the zeros
+/// and the lag of the recording, and without a slider, which no layout has.
 Written written_layout(Fitted fitted, const CalibrateArguments& a, const Calibration& found,
                        const PressRecording& recording) {
-  SkinNumbers numbers = found.found, kept;
+  SkinNumbers numbers = found.found;
   for (const UntoldNumber& number : found.untold) numbers.erase(number.name);
   set_numbers(numbers, 5, fitted);
-  for (const char* const name : {kZero, kForceZero, kLag})
-    if (numbers.contains(name)) kept[name] = numbers[name];
   const auto scene = [&](const SkinNumbers&) { return press_scene(fitted.layout, a.indenter); };
-  const PressError error = check_calibration({.scene = scene, .start = {}, .friction = a.friction},
-                                             kept, recording, found.rows);
+  const PressError error =
+      check_calibration({.scene = scene, .start = {}, .friction = a.friction}, {}, recording,
+                        scored_rows(recording, fitted.start.contains(kRelaxation)));
   return {std::move(fitted.layout), error};
 }
 
-/// Names the sensor as measured if anything of it was fitted, and adds comments.
-void add_remarks(const Fitted& fitted, const Calibration& found, const std::string& recording,
+bool is_of_recording(const std::string& name) {
+  return std::ranges::count(kRecordingNumbers, name) > 0;
+}
+
+/// Names the numbers of the recording that were fitted beside those of the layout: "zero, lag".
+std::string beside_text(const Calibration& found) {
+  std::vector<std::string> names;
+  for (const FittedNumber& number : found.numbers)
+    if (is_of_recording(number.name) && number.name != kSliderForce) names.push_back(number.name);
+  return names.empty() ? "holding rows out" : fmt::format("{}", fmt::join(names, ", "));
+}
+
+/// Names the sensor as measured if anything of it was fitted, and adds comments. Returns whether
+/// the layout is another.
+bool add_remarks(const Fitted& fitted, const Calibration& found, const std::string& recording,
                  Written& written) {
   std::vector<std::string> names;
   bool slider = false;
@@ -229,30 +259,34 @@ void add_remarks(const Fitted& fitted, const Calibration& found, const std::stri
     if (fitted.start.contains(number.name)) names.push_back(number.name);
     slider = slider || number.name == kSlider;
   }
-  if (fitted.knots > 0) names.emplace_back("pressure");
+  if (fitted.knots > 0) names.emplace_back(kTable);
   const std::string file = std::filesystem::path(recording).filename().string();
   LayoutFile& layout = written.layout;
   if (!names.empty()) {
     name_as_measured(layout);
-    layout.add_comment(fmt::format(
+    std::string text = fmt::format(
         "{}: measured, fitted by 'tangere calibrate' to {}, {} rows, to {} of the peak",
-        fmt::join(names, ", "), file, written.error.rows, percent(written.error.root_mean_square)));
+        fmt::join(names, ", "), file, found.normal.rows, percent(found.normal.root_mean_square));
+    const std::string score = percent(written.error.root_mean_square);
+    if (score != percent(found.normal.root_mean_square) || written.error.rows != found.normal.rows)
+      text += fmt::format("; without {}, as --score, {} rows, to {}", beside_text(found),
+                          written.error.rows, score);
+    layout.add_comment(text);
   }
   if (slider)
     layout.add_comment(
-        fmt::format("without the slider that was fitted beside it, of {:.5g} N/m and {:.5g} N; "
-                    "with it to {} of the peak",
-                    found.found.at(kSlider), found.found.at(kSliderForce),
-                    percent(found.normal.root_mean_square)));
+        fmt::format("the slider that was fitted beside it is no part of the layout: {:.5g} N/m and "
+                    "{:.5g} N",
+                    found.found.at(kSlider), found.found.at(kSliderForce)));
   const auto own = fitted.own.find(kFriction);
-  if (found.least_friction > (own == fitted.own.end() ? 0 : own->second)) {
-    const std::string mu = fmt::format("{:.5g}", found.least_friction);
-    layout.set(kFriction, mu);
-    layout.add_comment(
-        fmt::format("mu: a lower bound, because nothing slips: {} is the largest ratio of shear to "
-                    "normal force in {}",
-                    mu, file));
-  }
+  if (!(found.least_friction > (own == fitted.own.end() ? 0 : own->second))) return !names.empty();
+  const std::string mu = fmt::format("{:.5g}", found.least_friction);
+  layout.set(kFriction, mu);
+  layout.add_comment(
+      fmt::format("mu: a lower bound, because nothing slips: {} is the largest ratio of shear to "
+                  "normal force in {}",
+                  mu, file));
+  return true;
 }
 
 /// Refuses what a fit to photographs does not use.
@@ -265,6 +299,7 @@ void check_for_pictures(const CalibrateArguments& a) {
                                     {"--table", a.table.has_value()},
                                     {"--score", a.score},
                                     {"--friction", a.friction},
+                                    {"--column", !a.columns.empty()},
                                     {"--fit", !a.numbers.empty()},
                                     {"--hold-out", a.hold_out.has_value()},
                                     {"--check", !a.check.empty()}})
@@ -275,10 +310,10 @@ void check_for_pictures(const CalibrateArguments& a) {
                     fmt::join(others, ", ")));
 }
 
-void warn(std::span<const std::string> doubts, std::size_t from, const std::string& file,
+void warn(std::span<const std::string> warnings, std::size_t from, const std::string& file,
           const Console& console) {
-  for (const std::string& doubt : doubts.subspan(from))
-    console.note(fmt::format("warning: {}: {}", file, doubt));
+  for (const std::string& warning : warnings.subspan(from))
+    console.note(fmt::format("warning: {}: {}", file, warning));
 }
 
 /// Says that a fitted table ends level; "" if it does not.
@@ -295,6 +330,33 @@ std::string level_text(const Scene& scene) {
       last, table->depth.end()[-2]);
 }
 
+/// Whether numbers of the layout are fitted, if there are any. `usual`: without names.
+bool fits_layout(const CalibrateArguments& a, bool usual) {
+  return a.numbers.empty() ? usual : !std::ranges::all_of(a.numbers, is_of_recording);
+}
+
+/// " (mu: nothing is sheared, …)".
+std::string untold_text(const Calibration& found) {
+  std::vector<std::string> reasons;
+  for (const UntoldNumber& number : found.untold)
+    reasons.push_back(fmt::format("{}: {}", number.name, number.reason));
+  return reasons.empty() ? "" : fmt::format(" ({})", fmt::join(reasons, "; "));
+}
+
+/// Refuses an output that would be the layout as it is.
+void check_output(const CalibrateArguments& a, const Fitted& fitted) {
+  if (a.output.empty() || fits_layout(a, !fitted.has_table)) return;
+  if (a.numbers.empty())
+    throw InputError(fmt::format(
+        "--output with {}, whose table of pressures stays, so that nothing would change; expected "
+        "--table N, or no --output",
+        a.sensor));
+  throw InputError(
+      fmt::format("--output beside --fit {}, which no layout has, so that nothing would change; "
+                  "expected an attribute of the layout among them, or no --output",
+                  fmt::join(a.numbers, " --fit ")));
+}
+
 int run_calibrate(const CalibrateArguments& a, const Console& console) {
   if (!a.channels.empty()) return run_channels(a, console);
   if (!a.pictures.empty()) {
@@ -303,11 +365,13 @@ int run_calibrate(const CalibrateArguments& a, const Console& console) {
                                   console);
   }
   check_arguments(a);
-  const PressRecording recording = read_press(a.recording, console);
-  const std::optional<PressRecording> other =
-      a.check.empty() ? std::nullopt : std::optional(read_press(a.check, console));
   TextOutput output(a.output, a.overwrite);
   const Fitted fitted = read_fitted(a);
+  const PressTableSensor sensor{fitted.layout.name(), fitted.points, a.columns};
+  const PressRecording recording = read_press(a.recording, sensor, console);
+  const std::optional<PressRecording> other =
+      a.check.empty() ? std::nullopt : std::optional(read_press(a.check, sensor, console));
+  check_output(a, fitted);
   if (fitted.has_table && !a.score)
     console.note(a.sensor + ": its table of pressures stays; --table N fits another");
   const CalibrationRequest request{.scene =
@@ -322,25 +386,41 @@ int run_calibrate(const CalibrateArguments& a, const Console& console) {
                                    .fit = !a.score && !fitted.has_table,
                                    .friction = a.friction,
                                    .hold_out = a.hold_out.value_or(0)};
-  std::vector<std::string> doubts =
-      doubts_of_press(press_scene(fitted.layout, a.indenter), recording);
-  warn(doubts, 0, a.recording, console);
+  std::vector<std::string> warnings =
+      press_warnings(press_scene(fitted.layout, a.indenter), recording);
+  warn(warnings, 0, a.recording, console);
   const Calibration found = calibrate(request, recording);
   Written written = written_layout(fitted, a, found, recording);
-  CalibrationReport report{found, fitted.own, fitted.per_area, fitted.knots, written.error, {}, {}};
-  const std::size_t said = doubts.size();
+  CalibrationReport report{.found = found,
+                           .own = fitted.own,
+                           .per_area = fitted.per_area,
+                           .knots = fitted.knots,
+                           .points = recording.points,
+                           .written = written.error,
+                           .other = {},
+                           .beside = beside_text(found),
+                           .warnings = {}};
+  const std::size_t said = warnings.size();
   const Scene skin = press_scene(written.layout, a.indenter);
-  std::ranges::copy(doubts_of_skin(skin), std::back_inserter(doubts));
+  std::ranges::copy(skin_warnings(skin, recording), std::back_inserter(warnings));
   if (const std::string level = level_text(skin); fitted.knots > 0 && !level.empty())
-    doubts.push_back(level);
-  warn(doubts, said, a.recording, console);
-  report.doubts = doubts;
+    warnings.push_back(level);
+  warn(warnings, said, a.recording, console);
+  report.warnings = warnings;
   if (other) report.other = check_calibration(request, found.found, *other);
   console.print(report_text(report));
-  add_remarks(fitted, found, a.recording, written);
-  output.write(written.layout.text(), console);
+  const bool changed = add_remarks(fitted, found, a.recording, written),
+             nothing = !changed && fits_layout(a, request.fit);
+  if (nothing)
+    console.note(fmt::format(
+        "{}: nothing of the layout could be fitted{}; {}", a.recording, untold_text(found),
+        a.output.empty() ? "it stays as it is" : a.output + " is not written"));
+  else
+    output.write(written.layout.text(), console);
+  if (!nothing) report.output = a.output;
+  report.exit_code = found.converged && !nothing ? kDone : kSomeFailed;
   report_json(report, console);
-  return found.converged ? kDone : kSomeFailed;
+  return report.exit_code;
 }
 
 }  // namespace
@@ -352,9 +432,10 @@ Command add_calibrate(CLI::App& program) {
   CLI::App& app = add_command(program, "calibrate", "Fit a sensor's layout to a recorded press",
                               "tangere calibrate press.csv --sensor gelsight_mini_measured --ball "
                               "0.0075 -o my_gel_measured.xml");
-  add_text(
-      app, "RECORDING", a.recording, "",
-      "Table (CSV) with a header: depth and force, and if recorded time, shear and shear_force");
+  add_text(app, "RECORDING", a.recording, "",
+           "Table (CSV) with a header: depth and force, or in its place a field with forces of "
+           "each point; "
+           "if recorded time, shear and shear_force, and beside a field x and y");
   add_text(app, "--sensor", a.sensor, "LAYOUT",
            "Layout of the sensor, whose skin faces z: a file, or one of the program's");
   add_text(app, "--pictures", a.pictures, "FOLDER",
@@ -384,9 +465,14 @@ Command add_calibrate(CLI::App& program) {
                         "Fit a table of N pressures by depth in place of modulus or kn");
   add_texts(app, "--fit", a.numbers, "NAME",
             "Fit this number and no others but those named so: modulus, kn or pressure (the "
-            "table), zero (of the depth), force_zero (of the load cell), relaxation, ks, mu, lag "
-            "(of the force), slider (beside the skin) [default: all but the last two that the "
-            "recording tells, and force_zero if rows are above the skin]");
+            "table), zero (of the depth), force_zero (of the load cell), x_zero and y_zero (of the "
+            "place, of a field), relaxation, ks, mu, lag (of the force), slider (beside the skin) "
+            "[default: all but the last two that the recording tells, and force_zero if rows are "
+            "above the skin]");
+  add_texts(
+      app, "--column", a.columns, "NAME=COLUMN",
+      "Column of the table that is depth, time, force, shear, shear_force, x or y, or the text "
+      "before the / of those of a field, in SI or behind a factor: depth=-1*q/press, field=pad");
   add_positive_number(
       app, "--hold-out", a.hold_out,
       "Rows that are compared and not fitted: how many, or a share below 1 [default: "

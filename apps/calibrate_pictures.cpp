@@ -129,7 +129,7 @@ double moved(const BallPress& press, const PressScore& score) {
 
 /// Warns of labels whose circle the fit changed by more than kMostGrowth or kMostMove: one wrong
 /// label changes all lamps.
-void note_doubtful_labels(const Photographs& of, const GelFit& fit, const Console& console) {
+void warn_of_labels(const Photographs& of, const GelFit& fit, const Console& console) {
   for (std::size_t k = 0; k < fit.scores.size(); ++k) {
     const double labelled = of.presses[k].label.radius, found = fit.scores[k].refined.radius,
                  by = moved(of.presses[k], fit.scores[k]);
@@ -207,7 +207,7 @@ int run_calibrate_pictures(const PictureCalibration& a, const Console& console) 
   const Photographs photographs = read_photographs(a.folder);
   const GelFit fit = fit_gel(photographs.background, photographs.presses, *a.ball, *a.pixel);
   console.print(scores_text(photographs, fit));
-  note_doubtful_labels(photographs, fit, console);
+  warn_of_labels(photographs, fit, console);
   if (xml) {
     const PressScore mean = fit.mean();
     const std::string text = gel_text(fit.gel, picture,

@@ -19,8 +19,9 @@ std::string interval_text(const FittedNumber& n) {
 /// "modulus [Pa]", "ks [N/m³]", "pressure at 0.001 m [Pa]" …
 std::string label_of(const std::string& number, const CalibrationReport& of) {
   static const std::map<std::string, const char*> kUnits = {
-      {"modulus", "Pa"}, {"relaxation", "s"}, {"zero", "m"},        {"force_zero", "N"},
-      {"lag", "s"},      {"slider", "N/m"},   {"slider_force", "N"}};
+      {"modulus", "Pa"},   {"relaxation", "s"}, {"zero", "m"},
+      {"force_zero", "N"}, {"x_zero", "m"},     {"y_zero", "m"},
+      {"lag", "s"},        {"slider", "N/m"},   {"slider_force", "N"}};
   if (number == "kn" || number == "ks")
     return fmt::format("{} [{}]", number, of.per_area ? "N/m³" : "N/m");
   for (int k = 1; k <= of.knots; ++k)
@@ -36,8 +37,15 @@ std::string own_text(const std::string& number, const SkinNumbers& own) {
   return at == own.end() ? "" : fmt::format("{:.4g}", at->second);
 }
 
-std::string error_text(const char* what, const PressError& error) {
+std::string error_text(const std::string& what, const PressError& error, std::size_t points) {
   if (error.rows == 0) return "";
+  if (points > 0)
+    return fmt::format(
+        "{}, {} row{} of {} points: off by {} of the peak (root mean square), {} at most; {} of "
+        "the "
+        "norm of a row's own field at most\n",
+        what, error.rows, error.rows == 1 ? "" : "s", points, percent(error.root_mean_square),
+        percent(error.largest), percent(error.largest_by_row));
   return fmt::format(
       "{}, {} row{}: off by {} of the peak (root mean square), {} at most; {} of a row's own force "
       "at most\n",
@@ -122,13 +130,15 @@ std::string report_text(const CalibrationReport& report) {
   for (const FittedNumber& n : found.numbers)
     text += fmt::format("{:<28}{:>12.5g}   {:<26}{}\n", label_of(n.name, report), n.value,
                         interval_text(n), own_text(n.name, report.own));
-  text += error_text("normal force", found.normal);
-  if (found.found.contains(kSlider))
-    text += error_text("the layout alone, which has no slider", report.written);
-  text += error_text("held out", found.normal_held_out);
-  text += error_text("the other recording", report.other);
-  text += error_text("shear force", found.shear);
-  text += error_text("held out", found.shear_held_out);
+  const std::size_t points = report.points;
+  text += error_text(points > 0 ? "pressing forces" : "normal force", found.normal, points);
+  if (percent(report.written.root_mean_square) != percent(found.normal.root_mean_square))
+    text += error_text(fmt::format("the layout without {}, as --score", report.beside),
+                       report.written, points);
+  text += error_text("held out", found.normal_held_out, points);
+  text += error_text("the other recording", report.other, points);
+  text += error_text(points > 0 ? "forces along the skin" : "shear force", found.shear, points);
+  text += error_text("held out", found.shear_held_out, points);
   for (const UntoldNumber& n : found.untold)
     text += fmt::format("not told: {}: {}\n", label_of(n.name, report), n.reason);
   for (const GivenNumber& n : found.given) text += given_text(n, report);
@@ -158,7 +168,9 @@ void report_json(const CalibrationReport& report, const Console& console) {
   const auto& correlation = found.zero_correlation;
   console.result(
       {{"command", "calibrate"},
-       {"exit_code", static_cast<int>(found.converged ? kDone : kSomeFailed)},
+       {"exit_code", report.exit_code},
+       {"output", report.output.empty() ? Json() : Json(report.output)},
+       {"points", report.points},
        {"numbers", numbers},
        {"table_depth", report.knots > 0 ? Json(found.found.at("table_depth")) : Json()},
        {"untold", untold},
@@ -175,7 +187,7 @@ void report_json(const CalibrationReport& report, const Console& console) {
        {"other", error_json(report.other)},
        {"shear", error_json(found.shear)},
        {"shear_held_out", error_json(found.shear_held_out)},
-       {"warnings", report.doubts},
+       {"warnings", report.warnings},
        {"converged", found.converged}});
 }
 

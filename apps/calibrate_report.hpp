@@ -14,9 +14,13 @@ struct CalibrationReport {
   const SkinNumbers& own;  ///< of the layout, where it has any
   bool per_area;           ///< whether coefficients count by area
   int knots;               ///< of a table
-  PressError written;      ///< of the layout as it is written, at the fitted rows
+  std::size_t points;      ///< of a recorded field; 0: forces
+  PressError written;      ///< of the layout as it is written, as --score gives it
   PressError other;        ///< of another recording
-  std::vector<std::string> doubts;
+  std::string beside;      ///< what was fitted and is not in the layout
+  std::vector<std::string> warnings;
+  std::string output{};  ///< file that is written; "" for none
+  int exit_code = 0;
 };
 
 /// A table of the numbers, the errors, and what the recording does not tell.

@@ -87,7 +87,7 @@ void check_header(const std::vector<std::string_view>& header, std::span<const s
   }
 }
 
-/// Calls row(fields, place) for every line that is neither empty nor a comment.
+/// Calls row(fields, place, line number) for every line that is neither empty nor a comment.
 template <class Row>
 void for_each_row(const std::string& path, const Row& row) {
   require_regular_file(path, "a csv file");
@@ -102,7 +102,7 @@ void for_each_row(const std::string& path, const Row& row) {
     if (source.line == 1 && line.starts_with(kByteOrderMark))
       line.remove_prefix(kByteOrderMark.size());
     line = trim(line);
-    if (!line.empty() && line.front() != '#') row(split(line), source.prefix());
+    if (!line.empty() && line.front() != '#') row(split(line), source.prefix(), source.line);
   }
   if (file.bad()) throw IoError(path + ": reading failed");
   if (!file.eof())
@@ -146,31 +146,35 @@ std::vector<std::vector<double>> read_csv(const std::string& path, std::size_t c
                                           std::span<const std::string> names) {
   std::vector<std::vector<double>> rows;
   bool first = true;
-  for_each_row(path, [&](const std::vector<std::string_view>& fields, const std::string& place) {
-    check_count(fields.size(), columns, "one per control", place);
-    if (std::exchange(first, false) && std::all_of(fields.begin(), fields.end(), is_word)) {
-      check_header(fields, names, place);
-      return;
-    }
-    std::vector<double>& row = rows.emplace_back();
-    for (std::size_t c = 0; c < columns; ++c) row.push_back(number_at(fields, c, place));
-  });
+  for_each_row(
+      path, [&](const std::vector<std::string_view>& fields, const std::string& place, int) {
+        check_count(fields.size(), columns, "one per control", place);
+        if (std::exchange(first, false) && std::all_of(fields.begin(), fields.end(), is_word)) {
+          check_header(fields, names, place);
+          return;
+        }
+        std::vector<double>& row = rows.emplace_back();
+        for (std::size_t c = 0; c < columns; ++c) row.push_back(number_at(fields, c, place));
+      });
   if (rows.empty()) fail_empty(path);
   return rows;
 }
 
 NamedColumns read_named_columns(const std::string& path) {
   NamedColumns out;
-  for_each_row(path, [&](const std::vector<std::string_view>& fields, const std::string& place) {
-    if (out.names.empty()) {
-      out.names = column_names(fields, place);
-      out.columns.resize(out.names.size());
-      return;
-    }
-    check_count(fields.size(), out.names.size(), "as in the header", place);
-    for (std::size_t c = 0; c < fields.size(); ++c)
-      out.columns[c].push_back(number_at(fields, c, place));
-  });
+  for_each_row(
+      path, [&](const std::vector<std::string_view>& fields, const std::string& place, int line) {
+        if (out.names.empty()) {
+          out.names = column_names(fields, place);
+          out.columns.resize(out.names.size());
+          out.header = place;
+          return;
+        }
+        check_count(fields.size(), out.names.size(), "as in the header", place);
+        out.lines.push_back(line);
+        for (std::size_t c = 0; c < fields.size(); ++c)
+          out.columns[c].push_back(number_at(fields, c, place));
+      });
   if (out.names.empty() || out.columns[0].empty()) fail_empty(path);
   return out;
 }
@@ -187,14 +191,15 @@ double NamedFields::number(const Row& row, std::size_t column) const {
 
 NamedFields read_named_fields(const std::string& path) {
   NamedFields out;
-  for_each_row(path, [&](const std::vector<std::string_view>& fields, const std::string& place) {
-    if (out.names.empty()) {
-      out.names = column_names(fields, place);
-      return;
-    }
-    check_count(fields.size(), out.names.size(), "as in the header", place);
-    out.rows.push_back({place, {fields.begin(), fields.end()}});
-  });
+  for_each_row(path,
+               [&](const std::vector<std::string_view>& fields, const std::string& place, int) {
+                 if (out.names.empty()) {
+                   out.names = column_names(fields, place);
+                   return;
+                 }
+                 check_count(fields.size(), out.names.size(), "as in the header", place);
+                 out.rows.push_back({place, {fields.begin(), fields.end()}});
+               });
   if (out.rows.empty()) fail_empty(path);
   return out;
 }

@@ -22,6 +22,8 @@ std::vector<std::vector<double>> read_csv(const std::string& path, std::size_t c
 struct NamedColumns {
   std::vector<std::string> names;
   std::vector<std::vector<double>> columns;  ///< parallel to names, all of one length
+  std::vector<int> lines;                    ///< of the rows, in the file
+  std::string header;                        ///< "file:line: " of the names, for messages
 };
 /// Reads a table whose first row has a different name for each column. Otherwise as read_csv().
 NamedColumns read_named_columns(const std::string& path);

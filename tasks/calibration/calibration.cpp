@@ -9,9 +9,10 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <tuple>
 
 #include "engine/base/error.hpp"
-#include "tasks/calibration/press_doubts.hpp"
+#include "tasks/calibration/press_warnings.hpp"
 
 namespace tangere {
 namespace {
@@ -41,39 +42,67 @@ double peak_of(std::span<const double> force) {
   return peak;
 }
 
+/// `width`: numbers of a row.
 PressError error_of(std::span<const double> computed, std::span<const double> recorded,
-                    std::span<const int> rows) {
+                    std::span<const int> rows, std::size_t width) {
   PressError out;
   const double peak = peak_of(recorded);
   for (const int row : rows) {
-    const double f = recorded[std::size_t(row)], off = std::abs(computed[std::size_t(row)] - f);
-    out.root_mean_square += off * off;
-    out.largest = std::max(out.largest, off / peak);
-    if (std::abs(f) > kSmallest * peak)
-      out.largest_by_row = std::max(out.largest_by_row, off / std::abs(f));
+    double own = 0, squares = 0, off_squares = 0;
+    for (std::size_t k = width * std::size_t(row); k < width * (std::size_t(row) + 1); ++k) {
+      const double f = recorded[k], off = std::abs(computed[k] - f);
+      own = std::max(own, std::abs(f));
+      squares += f * f, off_squares += off * off;
+      out.largest = std::max(out.largest, off / peak);
+    }
+    out.root_mean_square += off_squares;
+    if (own > kSmallest * peak)
+      out.largest_by_row = std::max(out.largest_by_row, std::sqrt(off_squares / squares));
   }
   out.rows = int(rows.size());
-  if (out.rows > 0) out.root_mean_square = std::sqrt(out.root_mean_square / out.rows) / peak;
+  if (out.rows > 0)
+    out.root_mean_square =
+        std::sqrt(out.root_mean_square / (double(out.rows) * double(width))) / peak;
   return out;
+}
+
+/// Numbers of a row of the normal and of the tangential forces.
+std::size_t normal_width(const PressRecording& r) { return std::max<std::size_t>(r.points, 1); }
+std::size_t shear_width(const PressRecording& r) { return std::max<std::size_t>(2 * r.points, 1); }
+
+void check_columns(const PressRecording& r) {
+  const bool fields = r.points > 0;
+  for (const auto& [name, column, width] :
+       {std::tuple{"force", &r.force, std::size_t{1}},
+        {"time", &r.time, 1},
+        {"shear", &r.shear, 1},
+        {"shear force", &r.shear_force, 1},
+        {"x", &r.x, 1},
+        {"y", &r.y, 1},
+        {"the field", &r.field, r.points},
+        {"the field along the skin", &r.shear_field, 2 * r.points}}) {
+    const bool needed = column == (fields ? &r.field : &r.force);
+    if (column->size() != width * r.rows() && (!column->empty() || needed))
+      throw InputError(fmt::format("a recording of {} depths and {} numbers of {}; expected {}",
+                                   r.rows(), column->size(), name,
+                                   width == 1 ? "as many" : "as many for each point"));
+  }
 }
 
 void check(const PressRecording& r) {
   if (r.rows() == 0) throw InputError("a recording without depths; expected one row at least");
-  for (const auto& [name, column] : {std::pair{"force", &r.force},
-                                     {"time", &r.time},
-                                     {"shear", &r.shear},
-                                     {"shear force", &r.shear_force}})
-    if (column->size() != r.rows() && (!column->empty() || column == &r.force))
-      throw InputError(
-          fmt::format("a recording of {} depths and {} numbers of {}; expected as many", r.rows(),
-                      column->size(), name));
-  if (r.shear.empty() != r.shear_force.empty())
+  check_columns(r);
+  if (r.points == 0 && r.shear.empty() != r.shear_force.empty())
     throw InputError("shear without its force, or the force without it; expected both or none");
+  if (r.points == 0 && !(r.x.empty() && r.y.empty()))
+    throw InputError("x or y without a field; expected a press in the middle of the skin");
+  if (!r.shear.empty() && !(r.x.empty() && r.y.empty()))
+    throw InputError("x or y beside a shear; expected presses at places, or a path");
   for (std::size_t k = 1; k < r.time.size(); ++k)
     if (!(r.time[k] > r.time[k - 1]))
       throw InputError(fmt::format("row {}: time {} s after {} s; expected ascending times", k + 1,
                                    r.time[k], r.time[k - 1]));
-  if (!(peak_of(r.force) > 0))
+  if (!(peak_of(r.normal()) > 0))
     throw InputError("a recording without any force; expected a press of the skin");
 }
 
@@ -90,6 +119,8 @@ std::string reason_against(const std::string& name, const PressRecording& r, std
   if ((name == kRelaxation || name == kLag) && r.time.empty()) return "the recording has no times";
   if ((name == kRelaxation || name == kLag) && r.rows() < 2) return "the recording has one row";
   if ((name == kShear || name == kFriction) && !varies(r.shear)) return "nothing is sheared";
+  if ((name == kShear || name == kFriction) && r.tangential().empty())
+    return "the field has no forces along the skin";
   return "";
 }
 
@@ -111,10 +142,14 @@ Names choose_numbers(const CalibrationRequest& request, const PressRecording& re
   usual.emplace_back(request.knots > 0 ? kTable : kZero);
   for (const char* const name : {kRelaxation, kShear, kFriction})
     if (request.start.contains(name)) usual.emplace_back(name);
-  if (rows_above(recording.depth, rows) > 0) usual.emplace_back(kForceZero);
+  const bool fields = recording.points > 0;
+  if (fields) usual.insert(usual.end(), {kPlaceX, kPlaceY});
+  if (!fields && rows_above(recording.depth, rows) > 0) usual.emplace_back(kForceZero);
   known = usual;
-  for (const char* const name : {kZero, kForceZero, kLag, kSlider})
-    if (std::ranges::count(known, name) == 0) known.emplace_back(name);
+  for (const char* const name : {kZero, kForceZero, kLag, kSlider}) {
+    const bool alone = name == kForceZero || name == kSlider;  // of a load cell
+    if (!(fields && alone) && std::ranges::count(known, name) == 0) known.emplace_back(name);
+  }
   for (const std::string& name : request.numbers)
     if (std::ranges::count(known, name) == 0)
       throw InputError(
@@ -155,6 +190,38 @@ std::vector<double> acting_depths(const PressRecording& r, const SkinNumbers& nu
   return out;
 }
 
+/// The rows of a recording as they act, with the numbers of the recording.
+class Acting {
+ public:
+  Acting(const PressRecording& r, const SkinNumbers& numbers)
+      : time_(r.time), depth_(acting_depths(r, numbers)), fields_(r.points > 0) {
+    PressRecording moved;
+    moved.time = r.time, moved.depth = depth_;
+    rate_ = moved.rates();
+    const double dx = number_or(numbers, kPlaceX, 0), dy = number_or(numbers, kPlaceY, 0);
+    x_ = r.shear.empty() ? r.x : r.shear, y_ = r.y;
+    if (dx != 0) x_.resize(r.rows());
+    if (dy != 0) y_.resize(r.rows());
+    for (double& x : x_) x += dx;
+    for (double& y : y_) y += dy;
+  }
+
+  /// Of presses without friction. A sum does not depend on where the indenter went by shear.
+  [[nodiscard]] PressPath normal() const {
+    PressPath path = whole();
+    if (!fields_) path.x = path.y = {};
+    return path;
+  }
+  [[nodiscard]] PressPath whole() const {
+    return {.depth = depth_, .rate = rate_, .time = time_, .x = x_, .y = y_, .fields = fields_};
+  }
+  [[nodiscard]] std::span<const double> depth() const { return depth_; }
+
+ private:
+  std::vector<double> time_, depth_, rate_, x_, y_;
+  bool fields_;
+};
+
 /// Adds the slider, if there is one. The indenter does not pull.
 void add_slider(std::span<const double> depth, const SkinNumbers& numbers,
                 std::vector<double>& force) {
@@ -171,10 +238,9 @@ void add_slider(std::span<const double> depth, const SkinNumbers& numbers,
 
 std::vector<double> normal_forces(const CalibrationRequest& request, const PressRecording& r,
                                   const SkinNumbers& numbers) {
-  PressRecording acting;
-  acting.time = r.time, acting.depth = acting_depths(r, numbers);
-  std::vector<double> force = press_forces(request.scene(numbers), acting.depth, acting.rates());
-  add_slider(acting.depth, numbers, force);
+  const Acting acting(r, numbers);
+  std::vector<double> force = press_forces(request.scene(numbers), acting.normal());
+  add_slider(acting.depth(), numbers, force);
   const double offset = number_or(numbers, kForceZero, 0);
   if (offset != 0)
     for (double& f : force) f += offset;
@@ -203,7 +269,7 @@ void scale_start(const CalibrationRequest& request, const PressRecording& r, dou
   if (request.knots > 0) straight[kDepth] = depth;
   for (const char* const name : {"modulus", "kn"})
     if (start.contains(name)) straight[name] = start[name];
-  const double factor = best_factor(normal_forces(request, r, straight), r.force);
+  const double factor = best_factor(normal_forces(request, r, straight), r.normal());
   if (const std::string reason = why_no_touch(request.scene(straight), depth);
       !std::isfinite(factor) && !reason.empty())
     throw InputError("the sensor feels nothing at any depth of the recording: " + reason +
@@ -219,20 +285,42 @@ void scale_start(const CalibrationRequest& request, const PressRecording& r, dou
   for (const char* const name : {"modulus", "kn"})
     if (start.contains(name)) start[name] *= factor;
   for (int k = 1; k <= request.knots; ++k) start[table_number(k)] = factor;  // increments
-  start[kSlider] = peak_of(r.force) / depth;
-  start[kSliderForce] = kSliderStart * peak_of(r.force);
+  start[kSlider] = peak_of(r.normal()) / depth;
+  start[kSliderForce] = kSliderStart * peak_of(r.normal());
   if (!r.time.empty()) start[kLag] = (r.time.back() - r.time.front()) / double(r.rows());
+}
+
+/// The whole forces at each row: along the normal, and the size of that along the skin.
+struct RowSums {
+  std::vector<double> normal, tangential;
+};
+RowSums row_sums(std::span<const double> normal, std::span<const double> tangential,
+                 std::size_t points) {
+  RowSums out;
+  const std::size_t width = std::max<std::size_t>(points, 1), rows = normal.size() / width;
+  for (std::size_t row = 0; row < rows; ++row) {
+    double sum = 0, a = 0, b = 0;
+    for (std::size_t k = row * width; k < (row + 1) * width; ++k) {
+      sum += normal[k];
+      if (points == 0)
+        a += tangential[k];
+      else
+        a += tangential[2 * k], b += tangential[2 * k + 1];
+    }
+    out.normal.push_back(sum), out.tangential.push_back(std::hypot(a, b));
+  }
+  return out;
 }
 
 /// Chooses a friction that some row exceeds and a spring that reaches it, because the fit does not
 /// move a friction at which nothing slips.
 void scale_shear_start(const Forces& shear, const std::vector<std::string>& names,
-                       const SkinNumbers& fixed, std::span<const double> normal,
+                       const SkinNumbers& fixed, const RowSums& sums,
                        std::span<const double> recorded, const SlipStart& slip,
                        SkinNumbers& start) {
   double ratio = 0;
-  for (std::size_t k = 0; k < normal.size(); ++k)
-    if (normal[k] > 0) ratio = std::max(ratio, std::abs(recorded[k]) / normal[k]);
+  for (std::size_t k = 0; k < sums.normal.size(); ++k)
+    if (sums.normal[k] > 0) ratio = std::max(ratio, sums.tangential[k] / sums.normal[k]);
   if (!(ratio > 0)) return;
   if (std::ranges::count(names, kShear) > 0) {
     SkinNumbers stuck = fixed;
@@ -262,20 +350,26 @@ void check_shear_sign(const Forces& shear, const SkinNumbers& numbers,
                     alike));
 }
 
-/// Returns what friction adds at all rows; empty if the sensor has none, or if rows are sheared.
+/// Returns what friction adds at all rows; empty if the sensor has none, or if rows are at several
+/// places.
 std::vector<double> friction_forces(const CalibrationRequest& request, const PressRecording& r,
                                     const SkinNumbers& numbers) {
   const Scene scene = request.scene(numbers);
   const ContactCoefficients& c = scene.sensors.at(0).coefficients;
-  if (!(c.mu > 0) || !(c.ks > 0) || varies(r.shear)) {
+  const bool sheared = varies(r.shear), placed = varies(r.x) || varies(r.y);
+  if (!(c.mu > 0) || !(c.ks > 0) || placed || (sheared && request.friction)) {
     if (!request.friction) return {};
-    throw InputError(
-        fmt::format("a fit with friction, of {} with mu = {} and ks = {}; expected a press without "
-                    "shear, and mu and ks above 0",
-                    varies(r.shear) ? "a shear" : "a sensor", c.mu, c.ks));
+    throw InputError(fmt::format(
+        "a fit with friction, of {} with mu = {} and ks = {}; expected presses in one place, "
+        "without shear, and mu and ks above 0",
+        sheared  ? "a shear"
+        : placed ? "presses at several places"
+                 : "a sensor",
+        c.mu, c.ks));
   }
   try {
-    return friction_shares(scene, acting_depths(r, numbers), r.time);
+    const Acting acting(r, numbers);
+    return friction_shares(scene, acting.whole());
   } catch (const InputError&) {  // a step of the path failed: nothing is known
     if (request.friction) throw;
     return {};
@@ -299,24 +393,26 @@ FrictionShare friction_share(const CalibrationRequest& request, const PressRecor
   FrictionShare out;
   if (share.empty()) return out;
   out.mu = request.scene(found).sensors.at(0).coefficients.mu;
-  out.largest = peak_of(share) / peak_of(r.force);
+  out.largest = peak_of(share) / peak_of(r.normal());
   if (!request.friction) out.moved = along.moves(share);
   return out;
 }
 
 /// Returns the largest ratio of shear to normal force, of rows whose normal force counts.
 double largest_ratio(const PressRecording& r) {
-  const double least = kSmallest * peak_of(r.force);
+  const RowSums sums = row_sums(r.normal(), r.tangential(), r.points);
+  const double least = kSmallest * peak_of(sums.normal);
   double ratio = 0;
   for (std::size_t k = 0; k < r.rows(); ++k)
-    if (r.force[k] > least) ratio = std::max(ratio, std::abs(r.shear_force[k]) / r.force[k]);
+    if (sums.normal[k] > least) ratio = std::max(ratio, sums.tangential[k] / sums.normal[k]);
   return ratio;
 }
 
 /// Finds what the zeros that are not fitted do. Those that nothing tells widen the intervals,
 /// unless the user chose the numbers.
-void add_given(ForceFit& fit, const Names& names, bool chosen, Calibration& out) {
+void add_given(ForceFit& fit, const Names& names, bool chosen, bool fields, Calibration& out) {
   for (const char* const zero : {kZero, kForceZero}) {
+    if (fields && zero == kForceZero) continue;  // of a load cell
     if (names.normal.empty() || std::ranges::count(names.normal, zero) > 0) continue;
     out.given.push_back(fit.given(zero));
     if (!out.given.back().told && !chosen) fit.hold(zero);
@@ -338,6 +434,52 @@ void check_table_rows(const CalibrationRequest& request, const Names& names, std
   if (fitted > rows)
     throw InputError(
         fmt::format("{} rows to fit {} numbers; expected a row for each at least", rows, fitted));
+}
+
+/// What the fit of a shear follows.
+struct ShearFit {
+  const CalibrationRequest& request;
+  const PressRecording& recording;
+  const std::vector<std::string>& names;
+  const SkinNumbers& start;
+  const std::vector<double>& normal;  ///< forces that were computed
+  const ForceFit& along;              ///< fit of the normal forces
+  std::function<SkinNumbers(SkinNumbers)> full;
+};
+
+/// Fits ks and mu from several starts, of which the best end counts.
+void fit_shear(const ShearFit& of, Calibration& out) {
+  const PressRecording& r = of.recording;
+  const std::vector<double>& recorded = r.tangential();
+  const std::size_t width = shear_width(r);
+  const RowSums sums = row_sums(of.normal, recorded, r.points);
+  const auto path = [&](const SkinNumbers& chosen) {
+    const SkinNumbers numbers = of.full(chosen);
+    const Acting acting(r, numbers);
+    return shear_forces(of.request.scene(numbers), acting.whole());
+  };
+  const double depth = *std::ranges::max_element(r.depth);
+  const auto fit_from = [&](const std::optional<SlipStart>& slip) {
+    SkinNumbers at = of.start;
+    if (slip) scale_shear_start(path, of.names, out.found, sums, recorded, *slip, at);
+    SkinNumbers begin = out.found;
+    for (const std::string& name : of.names) begin[name] = at.at(name);  // none: a score
+    check_shear_sign(path, begin, recorded);
+    ForceFit fit(path, recorded, {out.rows, width}, depth, 0);
+    fit.run(of.names, at, out.found);
+    return std::pair{error_of(path(fit.found()), recorded, out.rows, width).root_mean_square, fit};
+  };
+  const bool slips = std::ranges::count(of.names, kFriction) > 0;
+  auto [least, across] = fit_from(slips ? std::optional(kSlipStarts[0]) : std::nullopt);
+  for (std::size_t k = 1; slips && k < std::size(kSlipStarts); ++k)
+    if (auto [error, fit] = fit_from(kSlipStarts[k]); error < least) least = error, across = fit;
+  across.add_errors_of(of.along);
+  add_fit(across, out);
+  if (std::ranges::count(across.untold(), kFriction, &UntoldNumber::name) > 0)
+    out.least_friction = largest_ratio(r);
+  const std::vector<double> shear = path(out.found);
+  out.shear = error_of(shear, recorded, out.rows, width);
+  out.shear_held_out = error_of(shear, recorded, out.held_out, width);
 }
 
 }  // namespace
@@ -369,69 +511,45 @@ Calibration calibrate(const CalibrationRequest& request, const PressRecording& r
         fmt::format("a table up to the depth {} m; expected depths positive into the skin", depth));
   const Names names = choose_numbers(request, recording, rows, out.untold);
   check_table_rows(request, names, rows.size());
-  if (!names.shear.empty() && !(peak_of(recording.shear_force) > 0))
+  if (!names.shear.empty() && !(peak_of(recording.tangential()) > 0))
     throw InputError("a shear without any force; expected shear forces, or no columns of a shear");
 
   SkinNumbers start = request.start;
   if (!names.normal.empty()) scale_start(request, recording, depth, start);
-  std::vector<double> sticking(recording.rows());  // of friction, held while the rest is fitted
+  const std::vector<double>& force = recording.normal();
+  const std::size_t width = normal_width(recording);
+  std::vector<double> sticking(force.size());  // of friction, held while the rest is fitted
   const auto full = [&](SkinNumbers numbers) {
     if (request.knots > 0) numbers[kDepth] = table_depth(depth, numbers);
     return numbers;
   };
   const auto press = [&](const SkinNumbers& numbers) {
-    std::vector<double> force = normal_forces(request, recording, full(numbers));
-    for (std::size_t k = 0; k < force.size(); ++k) force[k] += sticking[k];
-    return force;
+    std::vector<double> computed = normal_forces(request, recording, full(numbers));
+    for (std::size_t k = 0; k < computed.size(); ++k) computed[k] += sticking[k];
+    return computed;
   };
-  ForceFit along(press, recording.force, rows, depth, request.knots);
+  const FitRows fitted{rows, width};
+  ForceFit along(press, force, fitted, depth, request.knots);
   along.run(names.normal, start, out.found, names.held);
   for (int pass = 0; request.friction && !names.normal.empty() && pass < kFrictionPasses; ++pass) {
     sticking = friction_forces(request, recording, full(along.found()));
-    along = ForceFit(press, recording.force, rows, depth, request.knots);
+    along = ForceFit(press, force, fitted, depth, request.knots);
     along.run(names.normal, start, out.found, names.held);
   }
-  add_given(along, names, !request.numbers.empty(), out);
+  add_given(along, names, !request.numbers.empty(), recording.points > 0, out);
   add_fit(along, out);
   out.zero_correlation = along.correlation(kZero, kForceZero);
   if (request.knots > 0) out.found[kDepth] = table_depth(depth, out.found);
   out.rows_above = rows_above(acting_depths(recording, out.found), rows);
   const std::vector<double> normal = all_forces(request, recording, out.found);
-  out.normal = error_of(normal, recording.force, rows);
-  out.normal_held_out = error_of(normal, recording.force, out.held_out);
+  out.normal = error_of(normal, force, rows, width);
+  out.normal_held_out = error_of(normal, force, out.held_out, width);
+  const bool sheared = !names.shear.empty() || (!request.fit && !recording.shear.empty() &&
+                                                !recording.tangential().empty());
+  if (sheared) fit_shear({request, recording, names.shear, start, normal, along, full}, out);
   if (!names.normal.empty()) out.friction = friction_share(request, recording, along, out.found);
-  if (names.shear.empty() && (request.fit || recording.shear.empty())) return out;
-
-  const auto path = [&](const SkinNumbers& chosen) {
-    const SkinNumbers numbers = full(chosen);
-    return shear_forces(request.scene(numbers), acting_depths(recording, numbers), recording.shear);
-  };
-  const auto fit_from = [&](const std::optional<SlipStart>& slip) {
-    SkinNumbers at = start;
-    if (slip)
-      scale_shear_start(path, names.shear, out.found, normal, recording.shear_force, *slip, at);
-    SkinNumbers begin = out.found;
-    for (const std::string& name : names.shear) begin[name] = at.at(name);  // none: a score
-    check_shear_sign(path, begin, recording.shear_force);
-    ForceFit fit(path, recording.shear_force, rows, depth, 0);
-    fit.run(names.shear, at, out.found);
-    return std::pair{error_of(path(fit.found()), recording.shear_force, rows).root_mean_square,
-                     fit};
-  };
-  const bool slips = std::ranges::count(names.shear, kFriction) > 0;
-  auto [least, across] = fit_from(slips ? std::optional(kSlipStarts[0]) : std::nullopt);
-  for (std::size_t k = 1; slips && k < std::size(kSlipStarts); ++k)
-    if (auto [error, fit] = fit_from(kSlipStarts[k]); error < least) least = error, across = fit;
-  across.add_errors_of(along);
-  add_fit(across, out);
-  if (std::ranges::count(across.untold(), kFriction, &UntoldNumber::name) > 0)
-    out.least_friction = largest_ratio(recording);
-  const std::vector<double> shear = path(out.found);
-  out.shear = error_of(shear, recording.shear_force, rows);
-  out.shear_held_out = error_of(shear, recording.shear_force, out.held_out);
   return out;
 }
-
 PressError check_calibration(const CalibrationRequest& request, const SkinNumbers& found,
                              const PressRecording& recording, std::vector<int> rows) {
   check(recording);
@@ -441,7 +559,8 @@ PressError check_calibration(const CalibrationRequest& request, const SkinNumber
           "the other recording has no times, and '{}' was fitted; expected times", name));
   if (rows.empty())
     for (int k = 0; k < int(recording.rows()); ++k) rows.push_back(k);
-  return error_of(all_forces(request, recording, found), recording.force, rows);
+  return error_of(all_forces(request, recording, found), recording.normal(), rows,
+                  normal_width(recording));
 }
 
 }  // namespace tangere

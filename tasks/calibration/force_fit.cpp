@@ -13,6 +13,10 @@ namespace {
 
 constexpr double kLeastInfluence = 1e-6;  // root mean square change, of the peak, by a whole number
 constexpr double kLeastSlip = 0.03;       // share of the forces that slip, by their squares
+// Steps of x for the differences of intervals: a share of a number, or of depth or peak.
+constexpr double kLongestStep = 0.1, kShortestStep = 1e-5;
+constexpr double kSameStep = 1.5;  // a factor by which another step is as good
+constexpr int kSecantPasses = 4;
 
 bool is_table_number(const std::string& name) { return name.starts_with("pressure["); }
 
@@ -39,8 +43,8 @@ double ForceFit::Scale::slope(double x) const {
   return kind == Kind::square ? 2 * unit * x : unit;
 }
 
-ForceFit::ForceFit(Forces forces, std::span<const double> recorded, std::vector<int> rows,
-                   double depth, int knots)
+ForceFit::ForceFit(Forces forces, std::span<const double> recorded, FitRows rows, double depth,
+                   int knots)
     : forces_(std::move(forces)),
       recorded_(recorded),
       rows_(std::move(rows)),
@@ -51,7 +55,7 @@ ForceFit::ForceFit(Forces forces, std::span<const double> recorded, std::vector<
 }
 
 ForceFit::Scale ForceFit::scale_of(const std::string& name, const SkinNumbers& start) const {
-  if (name == kZero) return {Scale::Kind::linear, depth_};
+  if (name == kZero || name == kPlaceX || name == kPlaceY) return {Scale::Kind::linear, depth_};
   if (name == kForceZero) return {Scale::Kind::linear, peak_};
   const bool vanishes = name == kRelaxation || name == kLag || is_table_number(name);
   return {vanishes ? Scale::Kind::square : Scale::Kind::exponential, start.at(name)};
@@ -74,7 +78,8 @@ void ForceFit::run(std::vector<std::string> names, const SkinNumbers& start, Ski
     found_ = minimise([&](std::span<const double> x) { return residuals(x); },
                       std::vector<double>(names.size(), 1.0));
     find_confidence();
-    const std::size_t weak = weakest();
+    std::size_t weak = weakest();
+    if (weak == names.size()) find_secants(), weak = weakest();
     if (weak == names.size()) return;
     untold_.push_back({names[weak], reason(names[weak])});
     if (names[weak] == kFriction || names[weak] == kSliderForce)  // so that it stays without slip
@@ -94,13 +99,19 @@ SkinNumbers ForceFit::numbers_at(std::span<const double> x) const {
   return out;
 }
 
-/// Over the peak, at the rows that are fitted.
-std::vector<double> ForceFit::residuals_of(const SkinNumbers& numbers) const {
-  const std::vector<double> computed = forces_(numbers);
+/// Returns forces of all rows over the peak, at the rows that are fitted.
+std::vector<double> ForceFit::fitted(std::span<const double> forces) const {
   std::vector<double> out;
-  for (const int row : rows_)
-    out.push_back((computed[std::size_t(row)] - recorded_[std::size_t(row)]) / peak_);
+  for (const int row : rows_.rows)
+    for (std::size_t k = 0; k < rows_.width; ++k)
+      out.push_back(forces[std::size_t(row) * rows_.width + k] / peak_);
   return out;
+}
+
+std::vector<double> ForceFit::residuals_of(const SkinNumbers& numbers) const {
+  std::vector<double> off = forces_(numbers);
+  for (std::size_t k = 0; k < off.size(); ++k) off[k] -= recorded_[k];
+  return fitted(off);
 }
 
 std::vector<double> ForceFit::residuals(std::span<const double> x) const {
@@ -125,12 +136,61 @@ SkinNumbers ForceFit::moved(std::size_t k, double dx) const {
   return out;
 }
 
+/// Returns the step of number k over which forces change as they do within its interval.
+double ForceFit::secant_step(std::size_t k, double half_interval) const {
+  double most = kLongestStep;
+  if (scales_[k].kind == Scale::Kind::square) most = std::min(most, std::abs(found_.x[k]) / 2);
+  return std::isfinite(half_interval) ? std::clamp(half_interval, kShortestStep, most) : most;
+}
+
+/// Returns the change of the residuals by a unit of number k, over ±`step`, or over the side on
+/// which they change by less than half as much: on the other one a force jumps.
+std::vector<double> ForceFit::secant(std::size_t k, double step) const {
+  const auto at = [&](double s) {
+    std::vector<double> x = found_.x;
+    x[k] += s;
+    return residuals(x);
+  };
+  std::vector<double> before = at(-step), after = at(step), both = after;
+  double squares_before = 0, squares_after = 0;
+  for (std::size_t row = 0; row < both.size(); ++row) {
+    both[row] = (after[row] - before[row]) / (2 * step);
+    before[row] = (found_.residuals[row] - before[row]) / step;
+    after[row] = (after[row] - found_.residuals[row]) / step;
+    squares_before += before[row] * before[row], squares_after += after[row] * after[row];
+  }
+  if (squares_before < squares_after / 4) return before;
+  return squares_after < squares_before / 4 ? after : both;
+}
+
+/// Replaces the derivatives by differences over half of the intervals, from long steps down. A
+/// force that jumps, where a point begins to be touched at a speed, has derivatives that say nothing
+/// about the next jump.
+void ForceFit::find_secants() {
+  std::vector<double> half(names_.size(), HUGE_VAL), step(names_.size());
+  for (int pass = 0; pass < kSecantPasses; ++pass) {
+    bool same = pass > 0;
+    for (std::size_t k = 0; k < names_.size(); ++k) {
+      const double next = secant_step(k, half[k]);
+      if (pass > 0 && next > step[k] / kSameStep && next < step[k] * kSameStep) continue;
+      same = false;
+      step[k] = next;
+      found_.jacobian[k] = secant(k, next);
+    }
+    if (same) return;
+    find_confidence();
+    for (std::size_t k = 0; k < names_.size(); ++k) {
+      std::vector<double> gradient(names_.size());
+      gradient[k] = 1;
+      half[k] = confidence_.half_interval(gradient);
+    }
+  }
+}
+
 void ForceFit::find_confidence() {
   Columns jacobian = found_.jacobian;
   for (const std::string& name : held_) jacobian.push_back(slope_by(name));
-  double squares = 0;
-  for (const double r : found_.residuals) squares += r * r;
-  confidence_ = Confidence(jacobian, squares);
+  confidence_ = Confidence(jacobian, found_.residuals, rows_.width);
 }
 
 void ForceFit::add_errors_of(const ForceFit& before) {
@@ -194,9 +254,8 @@ std::vector<FittedNumber> ForceFit::numbers() const {
 }
 
 std::vector<FittedNumber> ForceFit::moves(std::span<const double> addition) const {
-  std::vector<double> change;
-  for (const int row : rows_) change.push_back(addition[std::size_t(row)] / peak_);
-  const Confidence answers(found_.jacobian, 0);  // of the fitted numbers alone
+  const std::vector<double> change = fitted(addition);
+  const Confidence answers(found_.jacobian);  // of the fitted numbers alone
   std::vector<FittedNumber> out;
   double pressure = 0;
   for (std::size_t k = 0; k < names_.size(); ++k) {
@@ -214,11 +273,12 @@ GivenNumber ForceFit::given(const std::string& name) const {
   const std::vector<double> slope = slope_by(name);
   Columns all = found_.jacobian;
   all.push_back(slope);
-  out.told = !Confidence(all, 0).rank_misses(all.size() - 1);
+  out.told = !Confidence(all).rank_misses(all.size() - 1);
   if (scales_[0].kind == Scale::Kind::linear) return out;
   std::vector<double> addition(recorded_.size());
-  for (std::size_t k = 0; k < rows_.size(); ++k)
-    addition[std::size_t(rows_[k])] = kError * slope[k] * peak_;
+  for (std::size_t k = 0; k < slope.size(); ++k)
+    addition[std::size_t(rows_.rows[k / rows_.width]) * rows_.width + k % rows_.width] =
+        kError * slope[k] * peak_;
   // Of a table the last pressure.
   const std::vector<FittedNumber> moved = moves(addition), values = numbers();
   std::size_t k = 0;

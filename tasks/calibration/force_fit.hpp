@@ -39,20 +39,25 @@ struct GivenNumber {
 inline constexpr const char *kZero = "zero", *kForceZero = "force_zero",
                             *kRelaxation = "relaxation", *kShear = "ks", *kFriction = "mu",
                             *kTable = "pressure", *kLag = "lag", *kSlider = "slider",
-                            *kSliderForce = "slider_force";
+                            *kSliderForce = "slider_force", *kPlaceX = "x_zero",
+                            *kPlaceY = "y_zero";
 
 /// Returns "pressure[3]", the name of a number of a table.
 std::string table_number(int k);
 
-/// Computes forces at all rows.
+/// Computes forces at all rows, one after the other.
 using Forces = std::function<std::vector<double>(const SkinNumbers&)>;
+
+/// The rows that are fitted, and how many numbers each has.
+struct FitRows {
+  std::vector<int> rows;
+  std::size_t width = 1;
+};
 
 class ForceFit {
  public:
-  /// `rows`: those that are fitted. `depth`: size of the zero [m]. `knots`: numbers of a table
-  /// after its first.
-  ForceFit(Forces forces, std::span<const double> recorded, std::vector<int> rows, double depth,
-           int knots);
+  /// `depth`: size of the zero [m]. `knots`: numbers of a table after its first.
+  ForceFit(Forces forces, std::span<const double> recorded, FitRows rows, double depth, int knots);
 
   /// Fits `names` from `start`, with `fixed` numbers. Those that turn out not to be told are listed
   /// in untold() and left out, so that the fit of the rest is without them. `held`: numbers that
@@ -89,18 +94,22 @@ class ForceFit {
   };
   [[nodiscard]] Scale scale_of(const std::string& name, const SkinNumbers& start) const;
   [[nodiscard]] SkinNumbers numbers_at(std::span<const double> x) const;
+  [[nodiscard]] std::vector<double> fitted(std::span<const double> forces) const;
   [[nodiscard]] std::vector<double> residuals_of(const SkinNumbers& numbers) const;
   [[nodiscard]] std::vector<double> residuals(std::span<const double> x) const;
   [[nodiscard]] std::vector<double> slope_by(const std::string& held) const;
   [[nodiscard]] SkinNumbers moved(std::size_t number, double dx) const;
   [[nodiscard]] bool holds(std::size_t friction) const;
+  [[nodiscard]] double secant_step(std::size_t k, double half_interval) const;
+  [[nodiscard]] std::vector<double> secant(std::size_t k, double step) const;
+  void find_secants();
   void find_confidence();
   [[nodiscard]] std::size_t weakest() const;
   [[nodiscard]] FittedNumber interval(std::size_t k) const;
 
   Forces forces_;
   std::span<const double> recorded_;
-  std::vector<int> rows_;
+  FitRows rows_;
   double peak_, depth_;
   int knots_;
   std::vector<std::string> names_;  // of a table: of its increments

@@ -52,6 +52,15 @@ double dot(std::span<const double> a, std::span<const double> b) {
 
 double norm(std::span<const double> a) { return std::sqrt(dot(a, a)); }
 
+/// Counts the residuals that are not 0, or that change.
+Eigen::Index telling(const Columns& jacobian, std::span<const double> residuals) {
+  Eigen::Index count = 0;
+  for (std::size_t k = 0; k < residuals.size(); ++k)
+    count += residuals[k] != 0 ||
+             std::ranges::any_of(jacobian, [k](const auto& column) { return column[k] != 0; });
+  return count;
+}
+
 }  // namespace
 
 LeastSquares minimise(const Residuals& residuals, std::vector<double> x) {
@@ -87,7 +96,9 @@ std::vector<double> slope_along(const std::function<std::vector<double>(double)>
   return out;
 }
 
-Confidence::Confidence(const Columns& jacobian, double squares) : jacobian_(jacobian) {
+Confidence::Confidence(const Columns& jacobian, std::span<const double> residuals,
+                       std::size_t width)
+    : jacobian_(jacobian) {
   const auto n = Eigen::Index(jacobian.size());
   if (n == 0) return;
   const auto m = Eigen::Index(jacobian[0].size());
@@ -102,9 +113,9 @@ Confidence::Confidence(const Columns& jacobian, double squares) : jacobian_(jaco
   const Eigen::SelfAdjointEigenSolver<Matrix> modes(J.transpose().lazyProduct(J));
   const Vector& strength = modes.eigenvalues();
   const auto rank = std::ranges::count_if(strength, [](double s) { return s >= kWeakest; });
-  const Eigen::Index freedom = m - rank;
+  const Eigen::Index freedom = (width > 1 ? telling(jacobian, residuals) : m) - rank;
   const double error =
-      freedom > 0 ? student_95(int(freedom)) * std::sqrt(squares / double(freedom)) : 0;
+      freedom > 0 ? student_95(int(freedom)) * norm(residuals) / std::sqrt(double(freedom)) : 0;
   const Vector scale = Eigen::Map<const Vector>(size_.data(), n).cwiseInverse();
   for (Eigen::Index k = 0; k < n; ++k) {
     const Vector direction = scale.cwiseProduct(modes.eigenvectors().col(k));
@@ -120,6 +131,20 @@ Confidence::Confidence(const Columns& jacobian, double squares) : jacobian_(jaco
       spread_.push_back(numbers_of(direction * deviation * error));
     else
       untold_.push_back(numbers_of(direction));
+  }
+  if (width > 1 && m / Eigen::Index(width) > rank) add_rows(residuals, width);
+}
+
+void Confidence::add_rows(std::span<const double> residuals, std::size_t width) {
+  const std::size_t n = residuals.size() / width, rank = solver_.size();
+  if (n <= rank) return;
+  const auto freedom = double(n - rank);
+  const double factor = student_95(int(n - rank)) * std::sqrt(double(n) / freedom);
+  for (std::size_t row = 0; row < n; ++row) {
+    std::vector<double> change(residuals.size());
+    for (std::size_t k = row * width; k < (row + 1) * width; ++k) change[k] = residuals[k] * factor;
+    std::vector<double>& moved = rows_.emplace_back();
+    for (std::size_t k = 0; k < size_.size(); ++k) moved.push_back(answer(k, change));
   }
 }
 
@@ -144,6 +169,7 @@ void Confidence::add_errors_of(const Confidence& before, const Columns& by) {
     return out;
   };
   for (const std::vector<double>& direction : before.spread_) spread_.push_back(moved(direction));
+  for (const std::vector<double>& direction : before.rows_) rows_.push_back(moved(direction));
   for (const std::vector<double>& direction : before.untold_) untold_.push_back(moved(direction));
 }
 
@@ -154,10 +180,13 @@ double Confidence::half_interval(std::span<const double> gradient) const {
   least = kUntoldShare * std::sqrt(least);
   for (const std::vector<double>& direction : untold_)
     if (std::abs(dot(gradient, direction)) > least) return HUGE_VAL;
-  double squares = 0;
-  for (const std::vector<double>& direction : spread_)
-    squares += std::pow(dot(gradient, direction), 2);
-  return std::sqrt(squares);
+  const auto along = [&](const Columns& directions) {
+    double squares = 0;
+    for (const std::vector<double>& direction : directions)
+      squares += std::pow(dot(gradient, direction), 2);
+    return std::sqrt(squares);
+  };
+  return std::max(along(spread_), along(rows_));
 }
 
 bool Confidence::rank_misses(std::size_t k) const { return missing_[k] > kUntoldShare; }

@@ -33,12 +33,16 @@ std::vector<double> slope_along(const std::function<std::vector<double>(double s
 
 /// What residuals r with the Jacobian J tell of numbers x. Gauss and Newton's covariance is
 /// s² (JᵀJ)⁻¹ with s² = Σ r²/(m - rank J), on the directions of x that change the residuals. The
-/// others are not told, and none is without more residuals than that rank.
+/// others are not told, and none is without more residuals than that rank. Where residuals come in
+/// rows of several, whose errors may be alike, the covariance is also that of whole rows g,
+/// n/(n - rank J) Σ_g (JᵀJ)⁻¹ J_gᵀ r_g r_gᵀ J_g (JᵀJ)⁻¹ with n rows, and the larger counts.
 class Confidence {
  public:
   Confidence() = default;
-  /// `squares`: Σ r².
-  Confidence(const Columns& jacobian, double squares);
+  /// `residuals`: empty: 0. `width`: residuals of a row. Of rows of several, residuals that are 0
+  /// and do not change are none.
+  explicit Confidence(const Columns& jacobian, std::span<const double> residuals = {},
+                      std::size_t width = 1);
 
   /// Adds the errors of numbers y that were found before, with the confidence `before`. `by`: the
   /// derivatives of the residuals by y.
@@ -55,9 +59,12 @@ class Confidence {
   [[nodiscard]] bool rank_misses(std::size_t k) const;
 
  private:
+  void add_rows(std::span<const double> residuals, std::size_t width);
+
   std::vector<double> size_;  ///< norms of the columns of J
   Columns jacobian_;
   Columns spread_;  ///< 95 % intervals along independent directions of x
+  Columns rows_;    ///< as spread_, of the errors of whole rows; empty without rows of several
   Columns untold_;  ///< directions of x whose residuals change by no more than rounding
   Columns solver_;  ///< the sum of s sᵀ is (JᵀJ)⁻¹ on the told directions
   std::vector<double> missing_;  ///< shares of the numbers in the other directions, 0 to 1

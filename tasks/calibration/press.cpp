@@ -16,30 +16,57 @@
 namespace tangere {
 namespace {
 
-constexpr FieldOutput kSum{0, FieldForm::sum};
-
-/// Reads the force on the skin [N].
-Vector3 force_on_skin(Readout& readout, const Batch& batch) {
-  std::array<double, 6> sum{};
-  std::span<double> reading = sum;
-  readout.read_block(batch, 0, kSum, {&reading, 1});
-  return {sum[0], sum[1], sum[2]};
+double at(std::span<const double> column, std::size_t row) {
+  return column.empty() ? 0 : column[row];
 }
 
+/// Reads the forces on the skin: their sum in its body's frame, or those of each point.
+class SkinForces {
+ public:
+  SkinForces(const Model& model, bool fields)
+      : readout_(model),
+        fields_(fields),
+        forces_(fields ? 3 * std::size_t(model.sensors()[0].points) : 6) {}
+
+  /// Adds those along the normal, positive in compression.
+  void add_normal(const Batch& batch, std::vector<double>& out) {
+    read(batch);
+    if (!fields_) return out.push_back(-forces_[2]);
+    for (std::size_t k = 0; k < forces_.size(); k += 3) out.push_back(forces_[k + 2]);
+  }
+  /// Adds those along x, or of each point along axis0 and axis1.
+  void add_tangential(const Batch& batch, std::vector<double>& out) {
+    read(batch);
+    if (!fields_) return out.push_back(forces_[0]);
+    for (std::size_t k = 0; k < forces_.size(); k += 3)
+      out.push_back(forces_[k]), out.push_back(forces_[k + 1]);
+  }
+
+ private:
+  void read(const Batch& batch) {
+    std::span<double> reading = forces_;
+    readout_.read_block(batch, 0, {0, fields_ ? FieldForm::ideal : FieldForm::sum}, {&reading, 1});
+  }
+
+  Readout readout_;
+  bool fields_;
+  std::vector<double> forces_;
+};
+
 /// Drives the indenter along a path, and calls f after each row.
-void drive(const Model& model, std::span<const double> depth, std::span<const double> shear,
-           const std::function<void(const Batch&)>& f) {
+void drive(const Model& model, const PressPath& path, const std::function<void(const Batch&)>& f) {
   Stepper stepper(model);
   Batch batch(model, 1);
-  const std::array<double, 3> start{shear.front(), 0, 1e-3}, rest{};
-  batch.set_state(0, start, rest);
-  for (std::size_t k = 0; k < depth.size(); ++k) {
-    stepper.step(batch, std::array<double, 3>{shear[k], 0, -depth[k]});
+  batch.set_state(0, std::array<double, 3>{at(path.x, 0), at(path.y, 0), 1e-3},
+                  std::array<double, 3>{});
+  for (std::size_t k = 0; k < path.depth.size(); ++k) {
+    const double x = at(path.x, k), y = at(path.y, k), depth = path.depth[k];
+    stepper.step(batch, std::array<double, 3>{x, y, -depth});
     if (failed(batch.status(0)))
       throw InputError(fmt::format(
           "row {}: the step to depth {} m and shear {} m failed: {}; expected a shorter "
           "way from row to row",
-          k + 1, depth[k], shear[k], to_string(batch.status(0))));
+          k + 1, depth, x, to_string(batch.status(0))));
     f(batch);
   }
 }
@@ -85,19 +112,19 @@ Scene placed_indenter(const Scene& scene) {
   return out;
 }
 
-std::vector<double> press_forces(const Scene& scene, std::span<const double> depth,
-                                 std::span<const double> rate) {
+std::vector<double> press_forces(const Scene& scene, const PressPath& path) {
   Scene smooth = scene;
   ContactCoefficients& c = smooth.sensors.at(0).coefficients;
   c.kt = c.mu = c.ks = 0;
   const Model model(smooth);
-  Readout readout(model);
+  SkinForces forces(model, path.fields);
   Batch batch(model, 1);
   std::vector<double> out;
-  for (std::size_t k = 0; k < depth.size(); ++k) {
-    const std::array<double, 3> q{0, 0, -depth[k]}, v{0, 0, -rate[k]};
+  for (std::size_t k = 0; k < path.depth.size(); ++k) {
+    const std::array<double, 3> q{at(path.x, k), at(path.y, k), -path.depth[k]},
+        v{0, 0, -at(path.rate, k)};
     batch.set_state(0, q, v);
-    out.push_back(-force_on_skin(readout, batch)[2]);
+    forces.add_normal(batch, out);
   }
   return out;
 }
@@ -110,31 +137,31 @@ Scene without_rates(const Scene& scene) {
   return slow;
 }
 
-std::vector<double> shear_forces(const Scene& scene, std::span<const double> depth,
-                                 std::span<const double> shear) {
+std::vector<double> shear_forces(const Scene& scene, const PressPath& path) {
   const Model model(without_rates(scene));
-  Readout readout(model);
+  SkinForces forces(model, path.fields);
   std::vector<double> out;
-  drive(model, depth, shear,
-        [&](const Batch& batch) { out.push_back(force_on_skin(readout, batch)[0]); });
+  drive(model, path, [&](const Batch& batch) { forces.add_tangential(batch, out); });
   return out;
 }
 
-std::vector<double> friction_shares(const Scene& scene, std::span<const double> depth,
-                                    std::span<const double> time) {
-  const bool timed = time.size() > 1;
+std::vector<double> friction_shares(const Scene& scene, const PressPath& path) {
+  const std::size_t rows = path.depth.size();
+  const bool timed = path.time.size() > 1;
   Scene sticky = timed ? scene : without_rates(scene);
-  if (timed) sticky.timestep = (time.back() - time.front()) / double(time.size() - 1);
+  if (timed) sticky.timestep = (path.time.back() - path.time.front()) / double(rows - 1);
   const Model model(sticky);
-  Readout readout(model);
-  std::vector<double> out, straight(depth.size()), rate(depth.size());
-  drive(model, depth, straight,
-        [&](const Batch& batch) { out.push_back(-force_on_skin(readout, batch)[2]); });
-  for (std::size_t k = 1; k < depth.size() && timed; ++k)
-    rate[k] = (depth[k] - depth[k - 1]) / sticky.timestep;
-  const std::vector<double> smooth = press_forces(sticky, depth, rate);
+  SkinForces forces(model, path.fields);
+  std::vector<double> out, rate(rows);
+  drive(model, path, [&](const Batch& batch) { forces.add_normal(batch, out); });
+  for (std::size_t k = 1; k < rows && timed; ++k)
+    rate[k] = (path.depth[k] - path.depth[k - 1]) / sticky.timestep;
+  PressPath same = path;
+  same.rate = rate;
+  const std::vector<double> smooth = press_forces(sticky, same);
   for (std::size_t k = 0; k < out.size(); ++k) out[k] -= smooth[k];
-  if (timed) out[0] = 0;  // whose rate is that from above the skin
+  // The rate of the first row is that from above the skin.
+  if (timed) std::fill_n(out.begin(), out.size() / rows, 0.0);
   return out;
 }
 
@@ -149,7 +176,8 @@ void for_fields(const Model& model, double zero, std::span<const double> depth,
     f(field);
   };
   for (const double d : depth) acting.push_back(d + zero);
-  if (!shear.empty()) return drive(model, acting, shear, read);
+  if (!shear.empty())
+    return drive(model, {.depth = acting, .rate = {}, .time = {}, .x = shear, .y = {}}, read);
   Batch batch(model, 1);
   for (std::size_t k = 0; k < acting.size(); ++k) {
     batch.set_state(0,

@@ -374,7 +374,7 @@ TEST(Calibrate, AGelOfDrawnPhotographsIsFound) {
 }
 
 /// A label beside its imprint is named, and a photograph without an imprint is no press.
-TEST(Calibrate, DoubtsLabelsThatAreFarOff) {
+TEST(Calibrate, LabelsThatAreFarOffAreNamed) {
   const Folder folder;
   draw_presses(folder);
   EXPECT_THAT(run(folder, kOfPhotographs).err, Not(HasSubstr("warning")));

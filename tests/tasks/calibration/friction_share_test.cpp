@@ -117,8 +117,9 @@ TEST(FrictionShare, AShearThatSlipsAtTheRimIsFound) {
   PressRecording r;
   for (int k = 1; k <= 10; ++k) r.depth.push_back(5e-5 * k), r.shear.push_back(0);
   for (int k = 1; k <= 10; ++k) r.depth.push_back(5e-4), r.shear.push_back(1.5e-5 * k);
-  r.force = press_forces(request.scene(truth), r.depth, std::vector<double>(r.depth.size()));
-  r.shear_force = shear_forces(request.scene(truth), r.depth, r.shear);
+  const PressPath path{.depth = r.depth, .rate = {}, .time = {}, .x = r.shear, .y = {}};
+  r.force = press_forces(request.scene(truth), path);
+  r.shear_force = shear_forces(request.scene(truth), path);
   const Calibration found = calibrate(request, r);
   for (const auto& [name, value] : truth)
     EXPECT_NEAR(found.found.at(name), value, 1e-3 * value) << name;

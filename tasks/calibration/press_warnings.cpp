@@ -2,7 +2,7 @@
 // A ball of radius R that is d deep cuts the surface in a circle of radius √(2 R d - d²). On a
 // layer it touches within about √(R d), and cells of side h make its force about 0.09 h/√(R d) too
 // large (docs/layer.md).
-#include "tasks/calibration/press_doubts.hpp"
+#include "tasks/calibration/press_warnings.hpp"
 
 #include <fmt/format.h>
 
@@ -77,7 +77,7 @@ double cut_radius(double ball, double depth) {
 }
 
 /// A flat end may be larger than the pad: it is only held against a length that none has.
-void doubt_size(const Scene& scene, const Places& places, std::vector<std::string>& out) {
+void warn_of_size(const Scene& scene, const Places& places, std::vector<std::string>& out) {
   const Shape& shape = scene.links.at(1).body.shape;
   const std::optional<double> ball = ball_of(scene);
   double size = ball.value_or(0);
@@ -97,33 +97,59 @@ void doubt_size(const Scene& scene, const Places& places, std::vector<std::strin
                               kSmallestEnd, factor_text(size, 1e3, "it was divided by 1000")));
 }
 
-void doubt_depth(double depth, std::optional<double> thickness, std::vector<std::string>& out) {
-  const double most = thickness.value_or(kDeepestPress);
-  if (depth > most)
-    out.push_back(fmt::format(
-        "a depth of {:.4g} m {}; expected metres, positive into the skin, {:.3g} at most{}", depth,
-        thickness ? "in a skin that ends at its thickness" : "in a skin", most,
-        depth * 1e-3 < most ? factor_text(depth, 1e-3, "the column is in mm: name it depth_mm")
-                            : ""));
-  if (depth > 0 && depth < kShallowest)
-    out.push_back(fmt::format("a largest depth of {:.3g} m; expected {:.3g} at least{}", depth,
-                              kShallowest,
-                              factor_text(depth, 1e3, "the column is in m: name it depth_m")));
+/// "line 7: ", where a row of a file is.
+std::string place_text(const PressRecording& r, std::size_t row) {
+  return row < r.lines.size() ? fmt::format("line {}: ", r.lines[row]) : "";
 }
 
-void doubt_speed(const PressRecording& r, std::vector<std::string>& out) {
-  double fastest = 0;
-  for (const double rate : r.rates()) fastest = std::max(fastest, std::abs(rate));
+bool is_milli(const std::string& unit) { return unit.starts_with("m") && unit.size() > 1; }
+
+void warn_of_depth(const PressRecording& r, std::optional<double> thickness,
+                   std::vector<std::string>& out) {
+  if (r.rows() == 0) return;
+  const auto deepest = std::size_t(std::ranges::max_element(r.depth) - r.depth.begin());
+  const double depth = r.depth[deepest], most = thickness.value_or(kDeepestPress);
+  const bool milli = is_milli(r.units.depth);
+  if (depth > most)
+    out.push_back(
+        place_text(r, deepest) +
+        fmt::format("a depth of {:.4g} m {}; expected metres, positive into the skin, "
+                    "{:.3g} at most{}",
+                    depth, thickness ? "in a skin that ends at its thickness" : "in a skin", most,
+                    depth * 1e-3 >= most ? ""
+                    : milli              ? factor_text(depth, 1e-3,
+                                                       "the column, which is named mm, is in um: divide "
+                                                                    "it by 1000")
+                            : factor_text(depth, 1e-3, "the column is in mm: name it depth_mm")));
+  if (depth > 0 && depth < kShallowest)
+    out.push_back(place_text(r, deepest) +
+                  fmt::format("a largest depth of {:.3g} m; expected {:.3g} at least{}", depth,
+                              kShallowest,
+                              factor_text(depth, 1e3,
+                                          milli ? "the column is in m: name it depth_m"
+                                                : "it was divided by 1000: multiply it by 1000")));
+}
+
+void warn_of_speed(const PressRecording& r, std::vector<std::string>& out) {
+  const std::vector<double> rates = r.rates();
+  std::size_t row = 0;
+  for (std::size_t k = 0; k < rates.size(); ++k)
+    if (std::abs(rates[k]) > std::abs(rates[row])) row = k;
+  const double fastest = rates.empty() ? 0 : std::abs(rates[row]);
   if (fastest > kFastestPress)
-    out.push_back(fmt::format(
-        "a speed of {:.3g} m/s; expected times in s, and {:.3g} m/s at "
-        "most{}",
-        fastest, kFastestPress, factor_text(fastest, 1e-3, "times or depths are 1000 times off")));
+    out.push_back(
+        place_text(r, row) +
+        fmt::format(
+            "a speed of {:.3g} m/s; expected times in s, and {:.3g} m/s at most{}", fastest,
+            kFastestPress,
+            factor_text(fastest, 1e-3,
+                        is_milli(r.units.time) ? "the times are in s: name the column time_s"
+                                               : "times or depths are 1000 times off")));
 }
 
 /// Whether points and cells are fine enough for the deepest row.
-void doubt_resolution(const TactileDescription& d, double ball, double depth, const Places& places,
-                      std::vector<std::string>& out) {
+void warn_of_resolution(const TactileDescription& d, double ball, double depth,
+                        const Places& places, std::vector<std::string>& out) {
   if (!(depth > 0)) return;
   const double radius = cut_radius(ball, depth);
   const auto points = std::ranges::count_if(places.distance, [&](double x) { return x < radius; });
@@ -148,21 +174,32 @@ void doubt_resolution(const TactileDescription& d, double ball, double depth, co
         cell, touched, 100 * error, kMostCellError * touched / kCellError));
 }
 
+/// What forces may be in that are 1000 times too large, or too small.
+const char* force_unit_text(const PressRecording& r, bool large) {
+  if (r.points > 0)
+    return large ? "in mN: name the field with --column field=0.001*NAME"
+                 : "in kN, or were divided by 1000: name the field with --column field=1000*NAME";
+  if (is_milli(r.units.force))
+    return large ? "1000 times too large, in uN: divide them by 1000"
+                 : "in N: name the column force_N";
+  return large ? "in mN: name the column force_mN" : "in kN, or were divided by 1000";
+}
+
 }  // namespace
 
-std::vector<std::string> doubts_of_press(const Scene& scene, const PressRecording& r) {
+std::vector<std::string> press_warnings(const Scene& scene, const PressRecording& r) {
   std::vector<std::string> out;
   const Places places = places_of(scene);
   const std::optional<double> ball = ball_of(scene);
   const double depth = r.rows() > 0 ? *std::ranges::max_element(r.depth) : 0;
-  doubt_size(scene, places, out);
-  doubt_depth(depth, thickness_of(scene.sensors[0]), out);
-  doubt_speed(r, out);
-  if (ball && out.empty()) doubt_resolution(scene.sensors[0], *ball, depth, places, out);
+  warn_of_size(scene, places, out);
+  warn_of_depth(r, thickness_of(scene.sensors[0]), out);
+  warn_of_speed(r, out);
+  if (ball && out.empty()) warn_of_resolution(scene.sensors[0], *ball, depth, places, out);
   return out;
 }
 
-std::vector<std::string> doubts_of_skin(const Scene& scene) {
+std::vector<std::string> skin_warnings(const Scene& scene, const PressRecording& r) {
   const TactileDescription& d = scene.sensors.at(0);
   const std::optional<double> thickness = thickness_of(d);
   double area = d.cell;
@@ -183,10 +220,7 @@ std::vector<std::string> doubts_of_skin(const Scene& scene) {
       fmt::format("a skin of {:.3g} {}; expected {:.0e} to {:.0e}", value,
                   modulus ? "Pa (Young's modulus)" : "N/m³ (stiffness by area)", low, high);
   if (other >= low && other <= high)
-    text += fmt::format("; {:.3g} if forces are {}", other,
-                        factor < 1 ? "in mN: name the column force_mN"
-                                   : "in kN, or were divided by "
-                                     "1000");
+    text += fmt::format("; {:.3g} if forces are {}", other, force_unit_text(r, factor < 1));
   return {text};
 }
 
