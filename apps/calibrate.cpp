@@ -269,7 +269,7 @@ bool add_remarks(const Fitted& fitted, const Calibration& found, const std::stri
         fmt::join(names, ", "), file, found.normal.rows, percent(found.normal.root_mean_square));
     const std::string score = percent(written.error.root_mean_square);
     if (score != percent(found.normal.root_mean_square) || written.error.rows != found.normal.rows)
-      text += fmt::format("; without {}, as --score, {} rows, to {}", beside_text(found),
+      text += fmt::format("; scored without {}, {} rows, to {}", beside_text(found),
                           written.error.rows, score);
     layout.add_comment(text);
   }

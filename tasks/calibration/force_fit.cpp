@@ -14,9 +14,15 @@ namespace {
 constexpr double kLeastInfluence = 1e-6;  // root mean square change, of the peak, by a whole number
 constexpr double kLeastSlip = 0.03;       // share of the forces that slip, by their squares
 // Steps of x for the differences of intervals: a share of a number, or of depth or peak.
-constexpr double kLongestStep = 0.1, kShortestStep = 1e-5;
-constexpr double kSameStep = 1.5;  // a factor by which another step is as good
+constexpr double kLongestStep = 0.1, kShortestStep = 1e-5, kShorter = 4;
 constexpr int kSecantPasses = 4;
+constexpr double kAlike = 1.5;  // by their squares
+
+double squares_of(std::span<const double> numbers) {
+  double sum = 0;
+  for (const double x : numbers) sum += x * x;
+  return sum;
+}
 
 bool is_table_number(const std::string& name) { return name.starts_with("pressure["); }
 
@@ -136,15 +142,8 @@ SkinNumbers ForceFit::moved(std::size_t k, double dx) const {
   return out;
 }
 
-/// Returns the step of number k over which forces change as they do within its interval.
-double ForceFit::secant_step(std::size_t k, double half_interval) const {
-  double most = kLongestStep;
-  if (scales_[k].kind == Scale::Kind::square) most = std::min(most, std::abs(found_.x[k]) / 2);
-  return std::isfinite(half_interval) ? std::clamp(half_interval, kShortestStep, most) : most;
-}
-
-/// Returns the change of the residuals by a unit of number k, over ±`step`, or over the side on
-/// which they change by less than half as much: on the other one a force jumps.
+/// Returns the change of the residuals by a unit of number k, over `step` to the side on which they
+/// change by less: on the other one a force may jump. Over both, if they change by about as much.
 std::vector<double> ForceFit::secant(std::size_t k, double step) const {
   const auto at = [&](double s) {
     std::vector<double> x = found_.x;
@@ -159,26 +158,28 @@ std::vector<double> ForceFit::secant(std::size_t k, double step) const {
     after[row] = (after[row] - found_.residuals[row]) / step;
     squares_before += before[row] * before[row], squares_after += after[row] * after[row];
   }
-  if (squares_before < squares_after / 4) return before;
-  return squares_after < squares_before / 4 ? after : both;
+  if (squares_before < squares_after / kAlike) return before;
+  return squares_after < squares_before / kAlike ? after : both;
 }
 
-/// Replaces the derivatives by differences over half of the intervals, from long steps down. A
+/// Replaces the derivatives by the least of differences over steps from half of an interval down. A
 /// force that jumps, where a point begins to be touched at a speed, has derivatives that say nothing
 /// about the next jump.
 void ForceFit::find_secants() {
-  std::vector<double> half(names_.size(), HUGE_VAL), step(names_.size());
+  std::vector<double> half(names_.size(), HUGE_VAL);
+  double share = 1;
   for (int pass = 0; pass < kSecantPasses; ++pass) {
-    bool same = pass > 0;
     for (std::size_t k = 0; k < names_.size(); ++k) {
-      const double next = secant_step(k, half[k]);
-      if (pass > 0 && next > step[k] / kSameStep && next < step[k] * kSameStep) continue;
-      same = false;
-      step[k] = next;
-      found_.jacobian[k] = secant(k, next);
+      double most = kLongestStep;
+      if (scales_[k].kind == Scale::Kind::square)
+        most = std::clamp(std::abs(found_.x[k]) / 2, kShortestStep, most);
+      const double step = std::clamp(share * half[k], kShortestStep, most);
+      std::vector<double> slope = secant(k, step);
+      if (pass < 2 || squares_of(slope) < squares_of(found_.jacobian[k]))
+        found_.jacobian[k] = std::move(slope);
     }
-    if (same) return;
     find_confidence();
+    if (pass > 0) share /= kShorter;
     for (std::size_t k = 0; k < names_.size(); ++k) {
       std::vector<double> gradient(names_.size());
       gradient[k] = 1;

@@ -100,7 +100,6 @@ class ForceFit {
   [[nodiscard]] std::vector<double> slope_by(const std::string& held) const;
   [[nodiscard]] SkinNumbers moved(std::size_t number, double dx) const;
   [[nodiscard]] bool holds(std::size_t friction) const;
-  [[nodiscard]] double secant_step(std::size_t k, double half_interval) const;
   [[nodiscard]] std::vector<double> secant(std::size_t k, double step) const;
   void find_secants();
   void find_confidence();

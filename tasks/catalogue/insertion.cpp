@@ -47,9 +47,10 @@ std::array<double, kSkinNumbers> elastic_skin(double kn, double mu, double share
 }
 
 /// Returns the scene with the unknown coefficients of the skin as its varying numbers, equal for
-/// both pads: those of the paper, or all.
+/// both pads: those of the paper, or all. A gel has the material of its scene.
 Scene with_skin(Scene scene, Friction friction) {
   scene.randomizations.clear();
+  if (friction == Friction::gel) return scene;
   const auto vary = [&](const SceneNumber& number) {
     RandomizationDescription d;
     d.number = number;

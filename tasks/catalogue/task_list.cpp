@@ -37,6 +37,7 @@ std::vector<Entry>& entries() {
       entry(declare_insertion, make_insertion, InsertionMotion::translation, Friction::viscous),
       entry(declare_insertion, make_insertion, InsertionMotion::rotation, Friction::viscous),
       entry(declare_insertion, make_insertion, InsertionMotion::both, Friction::elastic),
+      entry(declare_insertion, make_insertion, InsertionMotion::both, Friction::gel),
       entry(declare_in_hand, make_in_hand, InHandObservation::tactile),
       entry(declare_in_hand, make_in_hand, InHandObservation::blind),
       {declare_dummy, make_dummy},

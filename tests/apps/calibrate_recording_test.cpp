@@ -164,6 +164,8 @@ TEST(CalibrateRecording, ImplausibleUnitsAreNamed) {
   EXPECT_THAT(run_json(folder, ball)["warnings"][0].get<std::string>(),
               HasSubstr("Pa (Young's modulus); expected 5e+03 to 2e+07; "));
   press("depth,force_mN", 1, 1);
+  EXPECT_THAT(run(folder, ball).err, HasSubstr("if forces are in N: name the column force_N"));
+  press("depth,force", 1, 1e-3);
   EXPECT_THAT(run(folder, ball).err, HasSubstr("if forces are in kN, or were divided by 1000"));
   press("depth_mm,force_mN", 1e3, 1e3);
   EXPECT_EQ(run_json(folder, ball)["warnings"], json::array());
@@ -237,7 +239,8 @@ TEST(CalibrateRecording, AWrittenTableIsWhatWasScored) {
   EXPECT_LT(fit["normal"]["root_mean_square"], 0.01);
   EXPECT_GT(fit["written"]["root_mean_square"], 0.03) << "without the slider";
   const std::string text = folder.read("out.xml");
-  EXPECT_THAT(text, HasSubstr("without the slider that was fitted beside it, of "));
+  EXPECT_THAT(text, HasSubstr("the slider that was fitted beside it is no part of the layout: "));
+  EXPECT_THAT(text, HasSubstr("; scored without slider, 61 rows, to 4.1 %"));
   const Words score = {"calibrate", "press.csv", "--sensor", "out.xml", "--flat", "0.0035"};
   for (const Words& more : {Words{}, Words{"--score"}}) {
     const json again = run_json(folder, score + more);

@@ -116,6 +116,7 @@ TEST(ShippedScenes, AreAllRunHere) {
                                      "in_hand",
                                      "mug",
                                      "insertion_elastic",
+                                     "insertion_gel",
                                      "rolling_ball",
                                      "rolling_ball_small",
                                      "stable_grasp",

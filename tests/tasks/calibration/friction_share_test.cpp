@@ -68,17 +68,17 @@ CalibrationRequest press_request() {
   return request;
 }
 
-const std::array kTruth{kTrueModulus, 0.0, kTrueTau};
+const std::array kPressTruth{kTrueModulus, 0.0, kTrueTau};
 
 TEST(FrictionShare, SaysHowFarFrictionMovesTheNumbers) {
   const Calibration found = calibrate(press_request(), stepped_press());
   EXPECT_EQ(found.friction.mu, 0.6);
   EXPECT_GT(found.friction.largest, 0.02);
   ASSERT_EQ(found.friction.moved.size(), 3U);
-  for (std::size_t k = 0; k < kTruth.size(); ++k) {
+  for (std::size_t k = 0; k < kPressTruth.size(); ++k) {
     const FittedNumber& number = found.numbers[k];
-    const double off = number.value - kTruth[k], said = -found.friction.moved[k].value;
-    EXPECT_TRUE(kTruth[k] < number.low || kTruth[k] > number.high)
+    const double off = number.value - kPressTruth[k], said = -found.friction.moved[k].value;
+    EXPECT_TRUE(kPressTruth[k] < number.low || kPressTruth[k] > number.high)
         << number.name << " is beyond its interval without friction";
     EXPECT_NEAR(off, said, 0.25 * std::abs(off)) << number.name << " " << number.value;
   }

@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: Apache-2.0
+// `tangere calibrate` with fields: a data set of the program as a table, and tables that are wrong.
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <filesystem>
+
+#include "tests/apps/press_recordings.hpp"
+#include "tests/apps/program.hpp"
+
+namespace tangere::apps {
+namespace {
+
+using nlohmann::json;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+/// 8 x 8 points, 0.5 mm apart, of a film of 2 mm.
+std::string film_array(const std::string& name, const std::string& more) {
+  return "<tactile name=\"" + name +
+         "\" type=\"rect_array\" resolution=\"8 8\" rect_pos0=\"-0.00175 0.00175 0\" "
+         "rect_pos1=\"0.00175 -0.00175 0\" axis0=\"0 -1 0\" axis1=\"1 0 0\" thickness=\"2e-3\" "
+         "mu=\"0\" " +
+         more;
+}
+
+/// A ball of 4 mm that goes in by 0.4 mm and beside by 0.3 mm.
+const std::string kPressScene =
+    "<tangere model=\"press\"><option unit=\"m-kg\" gravity=\"0 0 0\" timestep=\"5e-3\" "
+    "integrator=\"BDF1\"/><robot><link name=\"base\"><joint name=\"base\" type=\"fixed\"/><body "
+    "name=\"base\" type=\"cuboid\" size=\"0.01 0.01 0.01\"/></link></robot><robot><link "
+    "name=\"ball\"><joint name=\"press\" type=\"translational\"/><body name=\"ball\" "
+    "type=\"sphere\" radius=\"0.004\" pos=\"0 0 0.004\"/></link></robot><actuator><motor "
+    "joint=\"press\" ctrl=\"position\" P=\"1e6\" D=\"10\"/></actuator><sensor>" +
+    film_array("pad",
+               "body=\"base\" modulus=\"2e5\" relaxation=\"4e-3\"><imperfections "
+               "noise=\"2e-5\"/></tactile>") +
+    "</sensor><control><piecewise end=\"0.2\"><at time=\"0\" value=\"0 0 0\"/><at time=\"0.05\" "
+    "value=\"0 0 -0.0002\"/><at time=\"0.1\" value=\"0 0 -0.0004\"/><at time=\"0.15\" "
+    "value=\"0.0003 0 -0.0004\"/></piecewise></control></tangere>";
+
+TEST(CalibrateField, ADataSetsFieldIsFitted) {
+  const Folder folder;
+  folder.write("press.xml", kPressScene);
+  folder.write("skin.xml", "<sensor unit=\"m-kg\">" +
+                               film_array("skin_guess", "modulus=\"1e5\" relaxation=\"4e-3\"/>") +
+                               "</sensor>");
+  ASSERT_EQ(run(folder, {"generate", "press.xml", "-o", "set", "--episodes", "1", "--every", "2",
+                         "--record", "q,pad.pressure"})
+                .exit_code,
+            0);
+  ASSERT_EQ(run(folder, {"export", "set", "--csv", "set.csv"}).exit_code, 0);
+  const Words words = {"calibrate", "set.csv",     "--sensor", "skin.xml",
+                       "--ball",    "0.004",       "--column", "depth=-1*q/press.z",
+                       "--column",  "x=q/press.x", "--column", "field=pad.pressure"};
+  const json fit = run_json(folder, words + Words{"-o", "out.xml"});
+  EXPECT_EQ(fit["points"], 64);
+  const json modulus = number(fit, "modulus");
+  EXPECT_NEAR(modulus["value"], 2e5, 0.01 * 2e5);
+  EXPECT_LT(modulus["low"], 2e5);
+  EXPECT_GT(modulus["high"], 2e5);
+  EXPECT_NEAR(number(fit, "x_zero")["value"], 0, 1e-5);
+  EXPECT_LT(fit["normal"]["root_mean_square"], 0.02);
+  EXPECT_THAT(folder.read("out.xml"), HasSubstr("skin_measured"));
+  // The comment, the report and a score of what was written have one number.
+  Words again = words;
+  again[3] = "out.xml";
+  const json score = run_json(folder, again + Words{"--score"});
+  EXPECT_NEAR(score["normal"]["root_mean_square"], fit["written"]["root_mean_square"], 1e-12);
+  const Outcome text = run(folder, words);
+  EXPECT_THAT(text.out, HasSubstr("pressing forces, 20 rows of 64 points: off by "));
+  EXPECT_THAT(text.out, HasSubstr("of the norm of a row's own field at most"));
+  EXPECT_THAT(text.err, HasSubstr("columns are not used: 'episode' to "));
+  // Rows that are held out are predicted, and a table of pressures is fitted to the field as well.
+  const json held = run_json(folder, words + Words{"--hold-out", "0.3"});
+  EXPECT_LT(held["normal_held_out"]["largest_by_row"], 0.1);
+  const json table =
+      run_json(folder, words + Words{"--table", "3", "--fit", "pressure", "-o", "table.xml"});
+  EXPECT_NEAR(table["normal"]["root_mean_square"], 0, 0.05);
+  EXPECT_THAT(folder.read("table.xml"), HasSubstr("pressure_depth=\"0 "));
+}
+
+/// A row of a field of n numbers.
+std::string field_table(const std::string& name, int n, const std::string& more = "") {
+  std::string header = "depth_mm", row = "0.1";
+  for (int k = 0; k < n; ++k) header += "," + name + "/" + std::to_string(k), row += ",1e-3";
+  return header + "\n" + row + "\n" + more;
+}
+
+TEST(CalibrateField, WhatIsWrongWithAFieldIsNamed) {
+  const Folder folder;
+  folder.write("skin.xml",
+               "<sensor unit=\"m-kg\">" + film_array("skin", "modulus=\"1e5\"/>") + "</sensor>");
+  const auto err = [&](const std::string& text, const Words& more) {
+    folder.write("p.csv", text);
+    const Outcome outcome =
+        run(folder, Words{"calibrate", "p.csv", "--sensor", "skin.xml", "--ball", "0.004"} + more);
+    EXPECT_EQ(outcome.exit_code, 2) << outcome.out;
+    return outcome.err;
+  };
+  EXPECT_THAT(
+      err(field_table("pressure", 63), {}),
+      HasSubstr("p.csv:1: 63 columns 'pressure/0' to 'pressure/62'; expected 64, a pressing "
+                "force for each point of 'skin', or 192, with those along axis0 and axis1 "
+                "before it"));
+  std::string gap = field_table("pressure", 64);
+  gap.replace(gap.find("pressure/7,"), 10, "other_colum");
+  EXPECT_THAT(err(gap, {}), HasSubstr("p.csv:1: no column 'pressure/7' before 'pressure/8'"));
+  std::string nan = field_table("pressure", 64);
+  nan.replace(nan.find("0.1,1e-3") + 4, 4, "nan");
+  EXPECT_THAT(err(nan, {}), HasSubstr("p.csv:2: column 2: 'nan'; expected a finite number"));
+  EXPECT_THAT(err(field_table("pressure", 64, "0.2,1\n"), {}),
+              HasSubstr("p.csv:3: 2 columns; expected 65, as in the header"));
+  EXPECT_THAT(err(field_table("taxel", 64), {}), HasSubstr("no column 'force' among depth_mm, "));
+  EXPECT_THAT(err(field_table("taxel", 64), {"--column", "field=pad"}),
+              HasSubstr("p.csv:1: no column 'pad/0' among depth_mm, "));
+  EXPECT_THAT(err(field_table("pressure", 64), {"--column", "depth=z"}),
+              HasSubstr("p.csv:1: no column 'z' among depth_mm, "));
+  EXPECT_THAT(err(field_table("pressure", 64), {"--column", "depth"}),
+              HasSubstr("--column 'depth'; expected NAME=COLUMN or NAME=FACTOR*COLUMN"));
+  EXPECT_THAT(err(field_table("pressure", 64), {"--column", "depth=mm*depth_mm"}),
+              HasSubstr("expected NAME=COLUMN or NAME=FACTOR*COLUMN"));
+  EXPECT_THAT(err(field_table("pressure", 64), {"--column", "force=depth_mm"}),
+              HasSubstr("--column force=…; expected one of field, time, depth"));
+  EXPECT_THAT(err(field_table("pressure", 64), {"--fit", "force_zero"}),
+              HasSubstr("'force_zero' cannot be fitted; expected some of modulus, zero"));
+  // A field in mN is named with what it would be.
+  folder.write("p.csv", field_table("taxel", 64));
+  const Outcome outcome = run(folder, {"calibrate", "p.csv", "--sensor", "skin.xml", "--ball",
+                                       "0.004", "--column", "field=1e5*taxel", "--fit", "modulus"});
+  EXPECT_THAT(outcome.err, HasSubstr("if forces are in mN: name the field with --column "
+                                     "field=0.001*NAME"));
+}
+
+/// Hints take the unit that a column has, and say in which line the value stands.
+TEST(CalibrateField, HintsFollowTheUnitOfAColumn) {
+  const Folder folder;
+  folder.write("skin.xml", layout("modulus=\"2e5\" thickness=\"4e-3\" mu=\"0\""));
+  const auto err = [&](const std::string& text) {
+    folder.write("p.csv", text);
+    return run(folder, {"calibrate", "p.csv", "--sensor", "skin.xml", "--ball", "0.004"}).err;
+  };
+  const std::string deep = err("depth_mm,force\n100,0.1\n800,1\n");
+  EXPECT_THAT(deep, HasSubstr("p.csv: line 3: a depth of 0.8 m in a skin"));
+  EXPECT_THAT(deep, HasSubstr("0.0008 if the column, which is named mm, is in um"));
+  EXPECT_THAT(deep, Not(HasSubstr("name it depth_mm")));
+  EXPECT_THAT(err("depth,force\n0.1,0.1\n0.8,1\n"), HasSubstr("name it depth_mm"));
+  EXPECT_THAT(err("depth_m,force\n1e-7,0.1\n8e-7,1\n"), Not(HasSubstr("name it depth_m")));
+  EXPECT_THAT(err("depth_mm,force\n1e-4,0.1\n8e-4,1\n"), HasSubstr("name it depth_m"));
+  EXPECT_THAT(err("time_ms,depth,force\n0,0,0\n0.01,1e-4,1\n0.02,2e-4,3\n"),
+              HasSubstr("the times are in s: name the column time_s"));
+  EXPECT_THAT(err("depth_mm,force_mN\n0.2,2e5\n0.4,8e5\n"),
+              HasSubstr("if forces are 1000 times too large, in uN"));
+}
+
+/// Where nothing of a layout is fitted, no layout is written, and the exit code says so.
+TEST(CalibrateField, ALayoutThatWouldNotChangeIsNotWritten) {
+  const Folder folder;
+  folder.write("press.csv", "time,depth,force\n0,1e-4,1\n100,2e-4,2\n200,3e-4,3\n");
+  folder.write("skin.xml", layout("modulus=\"1e5\" thickness=\"4e-3\" relaxation=\"0.02\""));
+  const Words words = {"calibrate", "press.csv", "--sensor", "skin.xml",
+                       "--flat",    "0.0035",    "-o",       "out.xml"};
+  const Outcome untold = run(folder, words + Words{"--fit", "relaxation"});
+  EXPECT_EQ(untold.exit_code, 1) << untold.out;
+  EXPECT_THAT(untold.err,
+              HasSubstr("press.csv: nothing of the layout could be fitted (relaxation: the rates "
+                        "of the recording do not show it); out.xml is not written"));
+  EXPECT_FALSE(std::filesystem::exists(folder.path("out.xml")));
+  const Outcome zero = run(folder, words + Words{"--fit", "zero"});
+  EXPECT_EQ(zero.exit_code, 2) << zero.out;
+  EXPECT_THAT(zero.err, HasSubstr("--output beside --fit zero, which no layout has"));
+  folder.write("skin.xml", layout("pressure=\"0 1e4\" pressure_depth=\"0 1e-3\""));
+  const Outcome table = run(folder, words);
+  EXPECT_EQ(table.exit_code, 2) << table.out;
+  EXPECT_THAT(table.err, HasSubstr("--output with skin.xml, whose table of pressures stays"));
+}
+
+}  // namespace
+}  // namespace tangere::apps
