@@ -103,13 +103,13 @@ int run_channels(const CalibrateArguments& a, const Console& console) {
 
 /// A layout, and what a fit changes in it.
 struct Fitted {
-  LayoutFile layout;
-  int knots = 0;           ///< of a table
-  bool per_area = false;   ///< whether coefficients count by area
-  bool has_table = false;  ///< of its own, which stays
-  SkinNumbers start;       ///< attributes that can be fitted
-  SkinNumbers own;         ///< of these, those that the layout has
-  std::size_t points = 0;  ///< of the sensor
+  LayoutFile layout, own_layout;  ///< and as it was read
+  int knots = 0;                  ///< of a table
+  bool per_area = false;          ///< whether coefficients count by area
+  bool has_table = false;         ///< of its own, which stays
+  SkinNumbers start;              ///< attributes that can be fitted
+  SkinNumbers own;                ///< of these, those that the layout has
+  std::size_t points = 0;         ///< of the sensor
 };
 
 /// Sets the attributes that can be fitted, as the layout has them, where it has any.
@@ -177,13 +177,8 @@ void set_numbers(const SkinNumbers& numbers, int digits, Fitted& fitted) {
 }
 
 Fitted read_fitted(const CalibrateArguments& a) {
-  Fitted fitted{LayoutFile(layout_text("--sensor", a.sensor), a.sensor),
-                a.table.value_or(0),
-                false,
-                false,
-                {},
-                {},
-                0};
+  const LayoutFile layout(layout_text("--sensor", a.sensor), a.sensor);
+  Fitted fitted{layout, layout, a.table.value_or(0), false, false, {}, {}, 0};
   const Scene scene = press_scene(fitted.layout, a.indenter);
   const TactileDescription& d = scene.sensors[0];
   fitted.points = tactile_points(d).size();
@@ -387,7 +382,7 @@ int run_calibrate(const CalibrateArguments& a, const Console& console) {
                                    .friction = a.friction,
                                    .hold_out = a.hold_out.value_or(0)};
   std::vector<std::string> warnings =
-      press_warnings(press_scene(fitted.layout, a.indenter), recording);
+      press_warnings(press_scene(fitted.own_layout, a.indenter), recording);
   warn(warnings, 0, a.recording, console);
   const Calibration found = calibrate(request, recording);
   Written written = written_layout(fitted, a, found, recording);

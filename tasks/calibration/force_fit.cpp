@@ -162,29 +162,52 @@ std::vector<double> ForceFit::secant(std::size_t k, double step) const {
   return squares_after < squares_before / kAlike ? after : both;
 }
 
-/// Replaces the derivatives by the least of differences over steps from half of an interval down. A
-/// force that jumps, where a point begins to be touched at a speed, has derivatives that say nothing
-/// about the next jump.
+/// Returns half of the interval of each x.
+std::vector<double> ForceFit::half_intervals() const {
+  std::vector<double> out;
+  for (std::size_t k = 0; k < names_.size(); ++k) {
+    std::vector<double> gradient(names_.size());
+    gradient[k] = 1;
+    out.push_back(confidence_.half_interval(gradient));
+  }
+  return out;
+}
+
+/// Returns a step of number k that is as long, within those that differences can have.
+double ForceFit::secant_step(std::size_t k, double length) const {
+  double most = kLongestStep;
+  if (scales_[k].kind == Scale::Kind::square)
+    most = std::clamp(std::abs(found_.x[k]) / 2, kShortestStep, most);
+  return std::clamp(length, kShortestStep, most);
+}
+
+/// Whether differences over half of the intervals are the derivatives.
+bool ForceFit::is_smooth() const {
+  const std::vector<double> half = half_intervals();
+  for (std::size_t k = 0; k < names_.size(); ++k) {
+    const double ratio =
+        squares_of(secant(k, secant_step(k, half[k]))) / squares_of(found_.jacobian[k]);
+    if (!(ratio > 1 / kAlike && ratio < kAlike)) return false;
+  }
+  return true;
+}
+
+/// Replaces the derivatives by the least of differences over steps from half of an interval down,
+/// unless they are alike. A force that jumps, where a point begins to be touched at a speed, has
+/// derivatives that say nothing about the next jump.
 void ForceFit::find_secants() {
+  if (is_smooth()) return;
   std::vector<double> half(names_.size(), HUGE_VAL);
   double share = 1;
   for (int pass = 0; pass < kSecantPasses; ++pass) {
     for (std::size_t k = 0; k < names_.size(); ++k) {
-      double most = kLongestStep;
-      if (scales_[k].kind == Scale::Kind::square)
-        most = std::clamp(std::abs(found_.x[k]) / 2, kShortestStep, most);
-      const double step = std::clamp(share * half[k], kShortestStep, most);
-      std::vector<double> slope = secant(k, step);
+      std::vector<double> slope = secant(k, secant_step(k, share * half[k]));
       if (pass < 2 || squares_of(slope) < squares_of(found_.jacobian[k]))
         found_.jacobian[k] = std::move(slope);
     }
     find_confidence();
     if (pass > 0) share /= kShorter;
-    for (std::size_t k = 0; k < names_.size(); ++k) {
-      std::vector<double> gradient(names_.size());
-      gradient[k] = 1;
-      half[k] = confidence_.half_interval(gradient);
-    }
+    half = half_intervals();
   }
 }
 

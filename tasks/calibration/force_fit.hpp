@@ -101,6 +101,9 @@ class ForceFit {
   [[nodiscard]] SkinNumbers moved(std::size_t number, double dx) const;
   [[nodiscard]] bool holds(std::size_t friction) const;
   [[nodiscard]] std::vector<double> secant(std::size_t k, double step) const;
+  [[nodiscard]] std::vector<double> half_intervals() const;
+  [[nodiscard]] double secant_step(std::size_t k, double length) const;
+  [[nodiscard]] bool is_smooth() const;
   void find_secants();
   void find_confidence();
   [[nodiscard]] std::size_t weakest() const;
