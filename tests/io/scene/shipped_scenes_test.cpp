@@ -282,8 +282,8 @@ TEST(ShippedScenes, TheRodIsFeltAndLifted) {
   }
 }
 
-TEST_P(PapersScenes, InsertionHitsTheRim) {
-  const SceneRun r("insertion" + suffix());
+void expect_insertion_hits_the_rim(const std::string& scene) {
+  const SceneRun r(scene);
   EXPECT_EQ(r.steps, 45);
   EXPECT_EQ(r.failed, 0);
   for (int e = 0; e < kEnvironments; ++e) {
@@ -300,6 +300,8 @@ TEST_P(PapersScenes, InsertionHitsTheRim) {
     EXPECT_GT(r.touch(last, e, 0).along - r.touch(last, e, 1).along, 0) << "pressed onto the rim";
   }
 }
+TEST_P(PapersScenes, InsertionHitsTheRim) { expect_insertion_hits_the_rim("insertion" + suffix()); }
+TEST(ShippedScenes, InsertionWithGelsHitsTheRim) { expect_insertion_hits_the_rim("insertion_gel"); }
 
 TEST_P(PapersScenes, CapIsTurnedByTwoStrokes) {
   const SceneRun r("cap_opening" + suffix());
