@@ -218,8 +218,8 @@ struct Written {
   PressError error;
 };
 
-/// Returns the layout with the fitted attributes. It is scored as it will be read: without the zeros
-/// and the lag of the recording, and without a slider, which no layout has.
+/// Returns the layout with the fitted attributes. It is scored as it will be read: without the
+/// zeros and the lag of the recording, and without a slider, which no layout has.
 Written written_layout(Fitted fitted, const CalibrateArguments& a, const Calibration& found,
                        const PressRecording& recording) {
   SkinNumbers numbers = found.found;

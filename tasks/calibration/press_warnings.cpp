@@ -110,17 +110,15 @@ void warn_of_depth(const PressRecording& r, std::optional<double> thickness,
   const auto deepest = std::size_t(std::ranges::max_element(r.depth) - r.depth.begin());
   const double depth = r.depth[deepest], most = thickness.value_or(kDeepestPress);
   const bool milli = is_milli(r.units.depth);
+  const char* const likely = milli ? "the column, which is named mm, is in um: divide it by 1000"
+                                   : "the column is in mm: name it depth_mm";
   if (depth > most)
     out.push_back(
         place_text(r, deepest) +
-        fmt::format("a depth of {:.4g} m {}; expected metres, positive into the skin, "
-                    "{:.3g} at most{}",
+        fmt::format("a depth of {:.4g} m {}; expected metres, positive into the skin, {:.3g} at "
+                    "most{}",
                     depth, thickness ? "in a skin that ends at its thickness" : "in a skin", most,
-                    depth * 1e-3 >= most ? ""
-                    : milli              ? factor_text(depth, 1e-3,
-                                                       "the column, which is named mm, is in um: divide "
-                                                                    "it by 1000")
-                            : factor_text(depth, 1e-3, "the column is in mm: name it depth_mm")));
+                    depth * 1e-3 < most ? factor_text(depth, 1e-3, likely) : ""));
   if (depth > 0 && depth < kShallowest)
     out.push_back(place_text(r, deepest) +
                   fmt::format("a largest depth of {:.3g} m; expected {:.3g} at least{}", depth,

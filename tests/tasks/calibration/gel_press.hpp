@@ -14,8 +14,8 @@
 
 namespace tangere::testing {
 
-/// A ball of 4 mm above 6 x 6 points, 0.6 mm apart, of a gel of 2 mm, with 3 x 3 cells. The numbers are attributes of
-/// the sensor.
+/// A ball of 4 mm above 6 x 6 points, 0.6 mm apart, of a gel of 2 mm, with 3 x 3 cells. The numbers
+/// are attributes of the sensor.
 inline Scene gel_press(SkinNumbers numbers, bool layer) {
   numbers.try_emplace("modulus", 1e5);
   std::string attributes;
