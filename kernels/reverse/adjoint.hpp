@@ -28,7 +28,7 @@ void adjoint_rhs(const ModelView& model, const StageArgs<N>& a, const AdjointArg
     const LinkScratch<N>& o = a.links[i];
     for (int k = link.v; k < link.v + dofs(link.kind); ++k) {
       if (link.has_chart) {
-        d.rhs[k] = mul_add(o.chart_rate.m[0][0], d.v_bar[k], o.chart.m[0][0] * d.q_bar[k]);
+        d.rhs[k] = along_dof_chart(o, d.q_bar[k], d.v_bar[k]);
         continue;
       }
       if (link.kind != JointKind::spherical) {

@@ -20,6 +20,7 @@
 // when moved and summed.
 #pragma once
 
+#include "kernels/step/dof_chart.hpp"
 #include "kernels/step/residual.hpp"
 
 namespace tangere::kernels {
@@ -148,8 +149,8 @@ template <JointKind K, class T, class N>
 void combine(const Link& link, const LinkScratch<N>& o, const N& c0_over_h, const T* d_dq,
              const T* d_dv, T* d_dx) {
   if constexpr (K != JointKind::spherical) {
-    if (dofs(K) == 1 && link.has_chart) {
-      d_dx[0] = mul_add(o.chart_rate.m[0][0], d_dv[0], o.chart.m[0][0] * d_dq[0]);
+    if (has_dof_chart<K>(link)) {
+      d_dx[0] = along_dof_chart(o, d_dq[0], d_dv[0]);
       return;
     }
     for (int k = 0; k < dofs(K); ++k) d_dx[k] = mul_add(c0_over_h, d_dv[k], d_dq[k]);
@@ -161,18 +162,6 @@ void combine(const Link& link, const LinkScratch<N>& o, const N& c0_over_h, cons
       d_dx[k] = sum;
     }
   }
-}
-
-/// Returns V_x of a joint that does not turn freely.
-template <JointKind K, class N>
-N rate_by_x(const Link& link, const LinkScratch<N>& o, const N& c0_over_h) {
-  return dofs(K) == 1 && link.has_chart ? o.chart_rate.m[0][0] : c0_over_h;
-}
-/// Turns what a unit of a joint's q does into what a unit of its x does.
-template <JointKind K, class T, class N>
-T along_x(const Link& link, const LinkScratch<N>& o, const T& d_dq) {
-  if (dofs(K) == 1 && link.has_chart) return o.chart.m[0][0] * d_dq;
-  return d_dq;
 }
 
 /// Wrenches of a joint's columns by x and by a, and of its rows, Bᶜᵀ S, which have no force.

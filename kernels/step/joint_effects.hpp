@@ -18,6 +18,7 @@
 #pragma once
 
 #include "kernels/numbers/rotation_vector.hpp"
+#include "kernels/step/dof_chart.hpp"
 #include "kernels/step/dry_friction.hpp"
 #include "kernels/step/stage.hpp"
 
@@ -218,8 +219,7 @@ void add_v_derivative(const ModelView& model, const StageArgs<N>& a, const Link&
   const EntryRows<N> entry = entries_at(model, a, link.v + j, link.v);
   const LinkScratch<N>& o = a.links[&link - model.links];
   if constexpr (K != JointKind::spherical) {
-    const N& V_x = dofs(K) == 1 && link.has_chart ? o.chart_rate.m[0][0] : a.c0_over_h;
-    entry(0, j) = mul_add(V_x, d_dv, entry(0, j));
+    entry(0, j) = mul_add(rate_by_x<K>(link, o, a.c0_over_h), d_dv, entry(0, j));
   } else {
     for (int k = 0; k < 3; ++k) entry(0, k) = mul_add(o.chart_rate.m[j][k], d_dv, entry(0, k));
   }
@@ -235,13 +235,13 @@ template <JointKind K, class N>
     add_v_derivative<K>(model, a, link, j, load.d_dv[j]);
     if (!(link.effects & kPositionDependent)) continue;
     const EntryRows<N> entry = entries_at(model, a, link.v + j, link.v);
-    const Mat3<N>& chart = a.links[&link - model.links].chart;
+    const LinkScratch<N>& o = a.links[&link - model.links];
     if constexpr (K != JointKind::spherical) {
-      entry(0, j) += dofs(K) == 1 && link.has_chart ? chart.m[0][0] * load.d_dq[j] : load.d_dq[j];
+      entry(0, j) += along_x<K>(link, o, load.d_dq[j]);
     } else {
       for (int k = 0; k < 3; ++k)
         for (int i = 0; i < 3; ++i)
-          entry(0, k) = mul_add(load.d_dtheta.m[j][i], chart.m[i][k], entry(0, k));
+          entry(0, k) = mul_add(load.d_dtheta.m[j][i], o.chart.m[i][k], entry(0, k));
     }
   }
 }
