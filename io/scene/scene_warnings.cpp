@@ -66,6 +66,13 @@ class SensorWarnings {
   }
 
  private:
+  /// A body with a distance that moves rigidly with the sensor's.
+  struct Part {
+    const BodyDescription& body;
+    kernels::Frame<double> in_group;
+    bool touched;
+  };
+
   [[nodiscard]] int group_of(const std::string& body) const {
     for (std::size_t k = 0; k < scene_.links.size(); ++k)
       if (scene_.links[k].body.name == body) return moving_link(scene_, static_cast<int>(k));
@@ -139,48 +146,60 @@ class SensorWarnings {
           fmt::format("lies at least {:.3g} m off that body, which is {:.3g} m across; expected "
                       "points on its surface, in the body's frame and the scene's unit",
                       least, wide));
-    if (most > kClose * wide) warn_of_points_beside(kClose * wide);
+    if (most > kClose * wide || !is_touched(sensor_.body)) warn_of_points_beside(kClose * wide);
   }
 
-  /// Bodies do not stop at points beside or above what moves rigidly with the sensor's body, so
-  /// such points read forces that nothing exerts. Half the distance between points is allowed, and
-  /// `close` [m] at least.
+  /// Bodies stop at what they touch. So points that lie beside or above all that moves rigidly with
+  /// the sensor's body and has a contact read forces that nothing exerts. Half the distance between
+  /// points is allowed, and `close` [m] at least.
   void warn_of_points_beside(double close) {
     if (is_the_contact()) return;
-    struct Part {
-      const Shape& shape;
-      kernels::Frame<double> in_group;
-    };
     std::vector<Part> parts;
     kernels::Frame<double> own = kIdentityFrame;
     for (const LinkDescription& link : scene_.links) {
       if (group_of(link.body.name) != own_) continue;
-      if (std::holds_alternative<AbstractShape>(link.body.shape)) continue;
-      if (!distance_from(link.body.shape, {0, 0, 0})) return;  // a mesh may carry the points
-      parts.push_back({link.body.shape, frame_in_group(link)});
-      if (link.body.name == sensor_.body) own = parts.back().in_group;
+      const Part part{link.body, frame_in_group(link), is_touched(link.body.name)};
+      if (link.body.name == sensor_.body) own = part.in_group;
+      if (distance_from(link.body.shape, {0, 0, 0}))
+        parts.push_back(part);
+      else if (part.touched)
+        return;  // a mesh or points without a distance, which may carry the sensor
     }
     const std::vector<TactilePoint> points = tactile_points(sensor_);
     const double allowed = std::max(close, 0.5 * spacing(points));
     std::size_t beside = 0;
     double most = 0;
+    std::set<std::string> untouched;  // where points lie that are off what bodies touch
     for (const TactilePoint& p : points) {
-      double least = std::numeric_limits<double>::infinity();
-      for (const Part& part : parts) {
+      const auto distance = [&](const Part& part) {
         const kernels::Frame<double> in_part = relative(part.in_group, own);
         const kernels::Vec3<double> at = in_part.R * vec3_of(p.position) + in_part.p;
-        least = std::min(least, distance_from(part.shape, {at.x, at.y, at.z})->distance);
-      }
+        return distance_from(part.body.shape, {at.x, at.y, at.z})->distance;
+      };
+      double least = std::numeric_limits<double>::infinity();
+      for (const Part& part : parts)
+        if (part.touched) least = std::min(least, distance(part));
       if (!(least > allowed)) continue;
       ++beside;
       most = std::max(most, least);
+      for (const Part& part : parts)
+        if (!part.touched && distance(part) <= allowed) untouched.insert(part.body.name);
     }
-    if (beside > 0)
-      add(
-          fmt::format("has {} of {} points up to {:.3g} m off that body and what is rigidly joined "
-                      "to it, where bodies reach without a contact, so they read forces that "
-                      "nothing exerts; expected points on its surface, to {:.2g} m",
-                      beside, points.size(), most, allowed));
+    if (beside == 0) return;
+    add(fmt::format(
+        "has {} of {} points up to {:.3g} m off what bodies touch there: that body and "
+        "what is rigidly joined to it, where a contact names them. Bodies reach these "
+        "points without a contact, so they read forces that nothing exerts; expected "
+        "{}points on the surface, to {:.2g} m",
+        beside, points.size(), most,
+        untouched.empty() ? "" : "a contact of " + listed(untouched) + ", or ", allowed));
+  }
+
+  /// Whether a contact names the body together with one that can move against it.
+  [[nodiscard]] bool is_touched(const std::string& body) const {
+    return std::ranges::any_of(scene_.pair_contacts, [&](const PairContactDescription& c) {
+      return (c.general_body == body || c.primitive_body == body) && !other_of(c).empty();
+    });
   }
 
   /// Whether bodies touch the sensor's points themselves.

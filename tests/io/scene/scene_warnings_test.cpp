@@ -90,9 +90,9 @@ TEST(SceneWarnings, PointsBesideTheFaceAreTold) {
   g.corner0 = "-0.01 -0.01 0.012", g.corner1 = "0.01 0.01 0.012";
   EXPECT_THAT(g.warnings(), IsEmpty());  // less than half the distance between points
   g.corner0 = "-0.014 -0.01 0.01", g.corner1 = "0.014 0.01 0.01";
-  EXPECT_THAT(g.warnings(),
-              ElementsAre(HasSubstr("has 10 of 25 points up to 0.004 m off that body and what is "
-                                    "rigidly joined to it")));
+  EXPECT_THAT(g.warnings(), ElementsAre(HasSubstr(
+                                "has 10 of 25 points up to 0.004 m off what bodies touch there: "
+                                "that body and what is rigidly joined to it")));
   Grasp one;  // a single point has no distance to another
   one.corner0 = one.corner1 = "0.003 0 0.0100001";
   one.resolution = "1 1";
@@ -105,12 +105,40 @@ TEST(SceneWarnings, PointsBesideTheFaceAreTold) {
                       "<body name=\"rim\" type=\"cuboid\" size=\"0.02 0.03 0.002\"/></link>";
     return g.warnings();
   };
+  // Bodies pass through a part without a contact.
+  EXPECT_THAT(with_part("fixed"), ElementsAre(::testing::AllOf(
+                                      HasSubstr("10 of 25"), HasSubstr("a contact of 'rim', or"))));
+  const std::string of_the_finger = g.contact;
+  g.contact +=
+      "<general_primitive_contact general_body=\"object\" primitive_body=\"rim\" kn=\"100\"/>";
   EXPECT_THAT(with_part("fixed"), IsEmpty());
+  g.contact = of_the_finger;
   g.inside_finger =
       "<link name=\"i\"><joint name=\"i\" type=\"fixed\"/><body name=\"i\" type=\"abstract\" "
       "mass=\"1\" inertia=\"1 1 1\"/></link>";
   EXPECT_THAT(g.warnings(), ElementsAre(HasSubstr("10 of 25")));  // a part without a surface
   EXPECT_THAT(with_part("revolute\" axis=\"1 0 0"), ElementsAre(HasSubstr("10 of 25")));
+}
+
+/// The skin lies on the finger, and only a part that is rigidly joined to it has a contact.
+TEST(SceneWarnings, PointsOnABodyWithoutAContactAreTold) {
+  Grasp g;
+  g.inside_finger =
+      "<link name=\"rim\"><joint name=\"rim\" type=\"fixed\" pos=\"0 0 -0.02\"/>"
+      "<body name=\"rim\" type=\"cuboid\" size=\"0.02 0.02 0.02\"/></link>";
+  EXPECT_THAT(g.warnings(), IsEmpty());
+  g.contact =
+      "<general_primitive_contact general_body=\"object\" primitive_body=\"rim\" kn=\"100\"/>";
+  EXPECT_THAT(g.warnings(), ElementsAre(::testing::AllOf(
+                                HasSubstr("25 of 25 points up to 0.02 m off what bodies"),
+                                HasSubstr("expected a contact of 'finger', or"))));
+  // Points of a part without a distance may lie anywhere.
+  g.inside_finger =
+      "<link name=\"rim\"><joint name=\"rim\" type=\"fixed\"/><body name=\"rim\" type=\"abstract\" "
+      "mass=\"1\" inertia=\"1 1 1\"><collision radius=\"0.01\" count=\"25\"/></body></link>";
+  g.contact =
+      "<general_primitive_contact general_body=\"rim\" primitive_body=\"object\" kn=\"20\"/>";
+  EXPECT_THAT(g.warnings(), IsEmpty());
 }
 
 /// Points of the object are 4 mm apart, those of the skin too.
