@@ -14,6 +14,7 @@
 #include "engine/scene/surface_contact.hpp"
 #include "engine/scene/surface_points.hpp"
 #include "io/files/text_file.hpp"
+#include "io/robot/joint_loads.hpp"
 #include "io/robot/mjcf_reader.hpp"
 #include "io/robot/robot_pads.hpp"
 #include "io/robot/rotations.hpp"
@@ -31,8 +32,7 @@ constexpr std::size_t kLargestRobot = std::size_t{64} << 20;
 constexpr const char* kRoots = "the root <robot> (URDF) or <mujoco> (MJCF)";
 constexpr double kYieldAngle = 0.01, kYieldLength = 1e-3;  // of a limit under its load [rad], [m]
 constexpr double kLoopGap = 1e-6;                          // of a loop under its load [m]
-constexpr double kLeastReach = 0.01;  // between a joint and what hangs on it [m]
-constexpr int kDeepestLinks = 200;    // of a scene
+constexpr int kDeepestLinks = 200;                         // of a scene
 
 /// Rounds up to two digits, because such a number is a choice.
 double two_digits(double x) {
@@ -40,115 +40,10 @@ double two_digits(double x) {
   return std::ceil(x / unit - 1e-9) * unit;
 }
 
-/// The largest force of a motor, as far as its ranges bound it; 0 if they do not.
-double largest_force(const MotorDescription& m) {
-  double largest = 0;
-  const auto add = [&](double force) {
-    if (std::isfinite(force)) largest = std::max(largest, std::abs(force));
-  };
-  add(m.low), add(m.high);
-  if (m.control == MotorControl::force && m.scale)
-    for (const double u : m.u_range) add(std::clamp(*m.scale * u + m.offset, m.low, m.high));
-  return largest;
-}
-
-/// The force with which a position motor moves its joint from one end of the targets to the other,
-/// or from one limit to the other if the targets have no bound; 0 for other motors, and where
-/// neither has one.
-double force_across_targets(const MotorDescription& m, const JointDescription& joint) {
-  if (m.control != MotorControl::position) return 0;
-  double span = std::abs(m.scale.value_or(1)) * (m.u_range[1] - m.u_range[0]);
-  if (!std::isfinite(span)) {
-    if (!joint.limits) return 0;
-    span = (*joint.limits)[1] - (*joint.limits)[0];
-  }
-  return std::min(m.P * span, std::max(std::abs(m.low), m.high));
-}
-
-/// The force or torque that a limit should hold: the weight of what hangs on the joint, or its
-/// motors' largest force. Of a joint without mass, those of the joints that it follows. What a loop
-/// should hold includes force_across_targets().
-class LimitLoads {
- public:
-  enum class Holder { limit, loop };
-  explicit LimitLoads(const Robot& robot, Holder holder = Holder::limit)
-      : robot_(robot),
-        scene_(robot.scene),
-        holder_(holder),
-        model_(scene_),
-        known_(scene_.links.size()) {
-    for (const LinkDescription& link : scene_.links)
-      at_.push_back(link.parent < 0 ? link.joint.pose
-                                    : compose(at_[std::size_t(link.parent)], link.joint.pose));
-  }
-
-  [[nodiscard]] double load(std::size_t i) {
-    if (known_[i]) return *known_[i];
-    const JointDescription& joint = scene_.links[i].joint;
-    double load = weight(i);
-    if (const auto effort = robot_.efforts.find(joint.name); effort != robot_.efforts.end())
-      load = std::max(load, effort->second);
-    for (const MotorDescription& m : scene_.motors)
-      if (m.joint == joint.name)
-        load = std::max({load, largest_force(m),
-                         holder_ == Holder::loop ? force_across_targets(m, joint) : 0.0});
-    if (is_transmission(scene_, joint)) load = std::max(load, whole_weight());
-    for (std::size_t k = 0; k < joint.follows.size() && weight(i) == 0; ++k)
-      for (std::size_t leader = 0; leader < scene_.links.size(); ++leader)
-        if (scene_.links[leader].joint.name == joint.follows[k] && joint.ratio[k] != 0)
-          load = std::max(load, this->load(leader) / std::abs(joint.ratio[k]));
-    return known_[i].emplace(load);
-  }
-
-  /// Where a point of a link's body is in the world with all joints at 0.
-  [[nodiscard]] Vector3 place(std::size_t link, const Vector3& in_body) const {
-    return outer_point(compose(at_[link], scene_.links[link].body.pose), in_body);
-  }
-  /// How far a point is from a joint [m].
-  [[nodiscard]] double distance(std::size_t joint, const Vector3& point) const {
-    const Vector3& p = at_[joint].position;
-    const Vector3 way = {point[0] - p[0], point[1] - p[1], point[2] - p[2]};
-    return std::max(kLeastReach, std::sqrt(dot(way, way)));
-  }
-  /// Whether a joint moves nothing itself, as that of a tendon.
-  [[nodiscard]] bool has_no_mass(std::size_t joint) const { return weight(joint) == 0; }
-
- private:
-  /// Of all links, which hang on a transmission at most.
-  [[nodiscard]] double whole_weight() const {
-    double mass = 0;
-    for (std::size_t k = 0; k < scene_.links.size(); ++k) mass += model_.mass(static_cast<int>(k));
-    return mass * std::max(std::sqrt(dot(scene_.gravity, scene_.gravity)), 1.0);
-  }
-
-  [[nodiscard]] double weight(std::size_t i) const {
-    const double g = std::max(std::sqrt(dot(scene_.gravity, scene_.gravity)), 1.0);
-    double mass = 0, reach = kLeastReach;
-    for (std::size_t k = i; k < scene_.links.size(); ++k) {
-      auto up = static_cast<int>(k);
-      while (up > static_cast<int>(i)) up = scene_.links[std::size_t(up)].parent;
-      if (up != static_cast<int>(i)) continue;
-      mass += model_.mass(static_cast<int>(k));
-      const Vector3 p = outer_point(at_[k], scene_.links[k].body.pose.position);
-      const Vector3 way = {p[0] - at_[i].position[0], p[1] - at_[i].position[1],
-                           p[2] - at_[i].position[2]};
-      reach = std::max(reach, std::sqrt(dot(way, way)));
-    }
-    return scene_.links[i].joint.type == JointType::revolute ? mass * g * reach : mass * g;
-  }
-
-  const Robot& robot_;
-  const Scene& scene_;
-  Holder holder_;
-  Model model_;
-  std::vector<Pose> at_;
-  std::vector<std::optional<double>> known_;  ///< loads
-};
-
 /// Chooses the stiffness of limits that have none: under their load they yield by kYieldAngle or
 /// kYieldLength.
 void stiffen_limits(Robot& robot) {
-  LimitLoads loads(robot);
+  JointLoads loads(robot, JointLoads::Holder::limit);
   for (std::size_t i = 0; i < robot.scene.links.size(); ++i) {
     JointDescription& joint = robot.scene.links[i].joint;
     if (!joint.limits || joint.limit_stiffness != 0) continue;
@@ -158,30 +53,10 @@ void stiffen_limits(Robot& robot) {
   }
 }
 
-/// The force that a loop should hold at a point: the loads of the joints on the way to it, and of
-/// tendons on them.
-double loop_load(const Scene& scene, LimitLoads& loads, std::size_t link, const Vector3& point) {
-  double load = 0;
-  for (auto i = static_cast<int>(link); i >= 0; i = scene.links[std::size_t(i)].parent) {
-    const JointDescription& joint = scene.links[std::size_t(i)].joint;
-    if (joint.type == JointType::fixed) continue;
-    const bool turns = joint.type == JointType::revolute;
-    const double reach = turns ? loads.distance(std::size_t(i), point) : 1;
-    load = std::max(load, loads.load(std::size_t(i)) / reach);
-    for (std::size_t k = 0; k < scene.links.size(); ++k) {
-      const JointDescription& tendon = scene.links[k].joint;
-      for (std::size_t n = 0; n < tendon.follows.size(); ++n)
-        if (tendon.follows[n] == joint.name && loads.has_no_mass(k))
-          load = std::max(load, loads.load(k) * std::abs(tendon.ratio[n]) / reach);
-    }
-  }
-  return load;
-}
-
 /// Chooses the stiffness of loops: under their load they yield by kLoopGap.
 void stiffen_loops(Robot& robot) {
   if (robot.scene.loops.empty()) return;
-  LimitLoads loads(robot, LimitLoads::Holder::loop);
+  JointLoads loads(robot, JointLoads::Holder::loop);
   for (LoopDescription& loop : robot.scene.loops) {
     const auto link_of = [&](const std::string& body) {
       return std::size_t(std::ranges::find_if(robot.scene.links,
@@ -190,10 +65,10 @@ void stiffen_loops(Robot& robot) {
     };
     const std::size_t one = link_of(loop.body1);
     const Vector3 point = loads.place(one, loop.position1);
-    double load = loop_load(robot.scene, loads, one, point), reach = loads.distance(one, point);
+    double load = loads.load_at(one, point), reach = loads.distance(one, point);
     if (!loop.body2.empty()) {
       const std::size_t two = link_of(loop.body2);
-      load = std::max(load, loop_load(robot.scene, loads, two, point));
+      load = std::max(load, loads.load_at(two, point));
       reach = std::max(reach, loads.distance(two, point));
     }
     loop.stiffness = two_digits(load / kLoopGap);
