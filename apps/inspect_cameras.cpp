@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include "engine/scene/field_form.hpp"
+#include "engine/scene/scene_number.hpp"
 
 namespace tangere::apps {
 namespace {
@@ -20,6 +21,28 @@ std::size_t triangles_in(const Scene& scene) {
     if (link.body.surface) triangles += link.body.surface->triangles.size();
   }
   return triangles;
+}
+
+/// "; varies: pos[0] light[1]", or "".
+std::string varying_text(const Scene& scene, const CameraDescription& camera) {
+  std::string text;
+  for (const RandomizationDescription& d : scene.randomizations)
+    if (d.number.owner == NumberOwner::camera && d.number.name == camera.name)
+      text +=
+          (text.empty() ? "; varies:" : "") + name_of(d.number).substr(owner_of(d.number).size());
+  return text;
+}
+
+/// A line of the bodies with materials, or "".
+std::string materials_text(const Scene& scene) {
+  std::string text;
+  for (const LinkDescription& link : scene.links) {
+    const BodyDescription& b = link.body;
+    if (b.rgba[3] == 0 || (b.specular == 0 && b.emission == 0)) continue;
+    text += fmt::format("{} {} (specular {}, shininess {}, emission {})", text.empty() ? "" : ",",
+                        b.name, b.specular, b.shininess, b.emission);
+  }
+  return text.empty() ? "" : "  materials:" + text + "\n";
 }
 
 }  // namespace
@@ -41,10 +64,12 @@ std::string cameras_text(const Scene& scene) {
     const PictureCost cost = picture_cost(scene, c);
     text += fmt::format(
         "  {} {}: {} x {} pixels, {} degrees; a picture: {} rays, {} triangles; bytes: rgb {}, "
-        "depth {}, ids {}\n",
+        "depth {}, ids {}{}\n",
         c.name, c.body.empty() ? std::string("in the world") : "on " + c.body, c.rows, c.cols,
-        c.fov, cost.rays, cost.triangles, cost.rgb_bytes, cost.depth_bytes, cost.ids_bytes);
+        c.fov, cost.rays, cost.triangles, cost.rgb_bytes, cost.depth_bytes, cost.ids_bytes,
+        varying_text(scene, c));
   }
+  text += materials_text(scene);
   if (const std::size_t triangles = triangles_in(scene); triangles > kManyTriangles)
     text += fmt::format(
         "  warning: {} triangles; more than {} take a millisecond a picture: thin the meshes\n",

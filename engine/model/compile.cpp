@@ -544,6 +544,7 @@ class Compiler {
         coefficient(m_.sensors[at(sensors_, "tactile sensor", n.name)].parameters);
         break;
       case NumberOwner::loop: vary_loop(m_, d, row); break;
+      case NumberOwner::camera: break;  // read where a picture is made
       case NumberOwner::body: vary_body(m_, int(at(bodies_, "body", n.name)), d, row); break;
       case NumberOwner::joint:
       case NumberOwner::motor: {

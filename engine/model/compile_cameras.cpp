@@ -39,6 +39,17 @@ void check_camera_name(const Scene& scene, const CameraDescription& d) {
 
 }  // namespace
 
+kernels::Frame<double> camera_frame(const CameraDescription& d) {
+  kernels::Frame<double> frame;
+  const CameraAxes axes = axes_of(d);
+  const std::array<const Vector3*, 3> columns{&axes.right, &axes.down, &axes.forward};
+  for (int row = 0; row < 3; ++row)
+    for (int col = 0; col < 3; ++col)
+      frame.R.m[row][col] = (*columns[std::size_t(col)])[std::size_t(row)];
+  frame.p = vec3_of(d.position);
+  return frame;
+}
+
 std::vector<CompiledCamera> compile_cameras(const Scene& scene) {
   std::vector<CompiledCamera> all;
   for (const CameraDescription& d : scene.cameras) {
@@ -51,12 +62,7 @@ std::vector<CompiledCamera> compile_cameras(const Scene& scene) {
     if (const std::string fault = camera_fault(d); !fault.empty()) refuse_camera(d, fault);
     CompiledCamera camera;
     camera.body = body_of(scene, d);
-    const CameraAxes axes = axes_of(d);
-    const std::array<const Vector3*, 3> columns{&axes.right, &axes.down, &axes.forward};
-    for (int row = 0; row < 3; ++row)
-      for (int col = 0; col < 3; ++col)
-        camera.frame.R.m[row][col] = (*columns[std::size_t(col)])[std::size_t(row)];
-    camera.frame.p = vec3_of(d.position);
+    camera.frame = camera_frame(d);
     camera.name_bits = hash_bytes(d.name);
     all.push_back(camera);
   }

@@ -16,6 +16,10 @@ struct CompiledCamera {
   std::uint64_t name_bits = 0;     ///< of its noise
 };
 
+/// Returns the axes of a camera as columns, and its pinhole, in the frame in which it is described.
+/// Of a camera without a direction they are not numbers.
+kernels::Frame<double> camera_frame(const CameraDescription& camera);
+
 /// Throws InputError for a body that does not exist, a name that a sensor or another camera has,
 /// values outside their bounds, and a camera without a direction.
 std::vector<CompiledCamera> compile_cameras(const Scene& scene);

@@ -40,6 +40,7 @@ enum class Purpose : std::uint8_t {
   picture_gain = 13,     ///< gains of a camera's channels
   channel_noise = 14,    ///< noise of a sensor's channel in a step
   channel_episode = 15,  ///< gain, offset and drift of a sensor's channel
+  camera = 16,           ///< <randomize> of a camera's pose and light
 };
 
 /// Identifies one random number. Different keys give independent numbers. The same key always gives

@@ -39,6 +39,28 @@ bool is_seen(const Place& a, const Place& b, const Place& c) {
 std::int64_t first_centre(std::int64_t place) { return (place - kHalf + kParts - 1) >> 8; }
 std::int64_t last_centre(std::int64_t place) { return (place - kHalf) >> 8; }
 
+/// The colour of a solid times a tone, and a share of white, rounded; at most white.
+std::uint32_t lit_colour(const ViewSolid& of, double tone, double white) {
+  std::uint32_t colour = 0;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const double level = 255 * std::clamp(of.colour[k], 0.0, 1.0) * tone + 255 * white;
+    colour |= static_cast<std::uint32_t>(std::min(level, 255.0) + 0.5) << (8 * k);
+  }
+  return colour;
+}
+
+/// The strength of the highlight at a surface with a unit normal, along a ray of any length.
+double highlight(const Vector3& normal, double cosine, const Vector3& light, const Vector3& ray,
+                 int exponent) {
+  const double length = std::sqrt(dot(ray, ray)), ahead = dot(light, ray) / length;
+  const double half =
+      (cosine - dot(normal, ray) / length) / std::sqrt(std::max(2 - 2 * ahead, 1e-20));
+  double x = std::clamp(half, 0.0, 1.0), power = 1;
+  for (int left = exponent; left > 0; left >>= 1, x *= x)
+    if ((left & 1) != 0) power *= x;
+  return power;
+}
+
 }  // namespace
 
 SceneView::Place SceneView::place_of(const Vector3& corner) const {
@@ -130,12 +152,10 @@ void SceneView::add_triangle(const std::array<Vector3, 3>& corners,
   if (!(plane < 0)) return;
   const auto [low, high] = std::minmax({corners[0][2], corners[1][2], corners[2][2]});
   const auto least = static_cast<float>(low), most = static_cast<float>(high);
-  const double tone =
-      ambient_ + (1 - ambient_) * std::clamp(dot(normal, light_) / length, 0.0, 1.0);
-  std::uint32_t colour = 0;
-  for (std::size_t k = 0; k < 3; ++k)
-    colour |= static_cast<std::uint32_t>(255 * std::clamp(of.colour[k], 0.0, 1.0) * tone + 0.5)
-              << (8 * k);
+  const double cosine = dot(normal, light_) / length;
+  const double tone = ambient_ + direct_ * std::clamp(cosine, 0.0, 1.0) + of.emission;
+  const bool shines = of.specular > 0 && cosine > 0;
+  const std::uint32_t colour = lit_colour(of, tone, 0);
   const std::int64_t x = kParts * first_col + kHalf, y = kParts * first_row + kHalf;
   std::array<Edge, 3> edges{edge_of(a, b, x, y), edge_of(b, c, x, y), edge_of(c, a, x, y)};
   const auto per_u = static_cast<float>(normal[0] / plane);
@@ -151,7 +171,12 @@ void SceneView::add_triangle(const std::array<Vector3, 3>& corners,
         if (t < depth_[pixel]) {
           depth_[pixel] = t;
           numbers_[pixel] = of.number;
-          colours_[pixel] = colour;
+          colours_[pixel] =
+              shines ? lit_colour(of, tone,
+                                  direct_ * of.specular *
+                                      highlight((1 / length) * normal, cosine, light_,
+                                                {double(u_[std::size_t(j)]), v, 1}, of.exponent))
+                     : colour;
         }
       }
       p += edges[0].per_col, q += edges[1].per_col, r += edges[2].per_col;

@@ -7,6 +7,8 @@
 //   cuboid: slabs, entered at -o_k/d_k - |a_k/d_k|, left at -o_k/d_k + |a_k/d_k|
 //   cylinder: the infinite one and a slab. Capsule: the infinite cylinder within the straight part,
 //   else the ball of that end. Half-space: s = -o_z/d_z
+//
+// A highlight is (n·h)^e with h along light - d, both unit: n·h = (n·light - n·d)/√(2 - 2 light·d).
 #include "engine/picture/scene_view.hpp"
 
 #include <algorithm>
@@ -38,15 +40,20 @@ struct RayRow {
   float square, pixel;  // sides of squares [m], and of a pixel at depth 1 m
   float far;
   std::int32_t number;
+  // Of solids with a highlight or an emission.
+  std::array<float, 3> unit;  // lengths along axes of the solid by those of o and d
+  float specular, emission;
+  int exponent;
+  bool bright;  // whether it has one, or its colours may be above white
 };
 
 struct Ray {
   float ox, oy, oz, dx, dy, dz;
 };
-/// Where a ray enters a solid, kNowhere if it does not, and the cosine between the normal and the
-/// light.
+/// Where a ray enters a solid, kNowhere if it does not, the cosine between the normal and the
+/// light, and the normal in the solid's axes, unit.
 struct Hit {
-  float s, cosine;
+  float s, cosine, x, y, z;
 };
 
 [[gnu::always_inline]] inline float root(float x) { return std::sqrt(x > 0 ? x : 0.0F); }
@@ -60,7 +67,8 @@ struct Hit {
               c = r.ox * r.ox + (r.oy * r.oy + r.oz * r.oz) - 1.0F, under = b * b - a * c,
               s = (-b - root(under)) / a;
   const float x = r.ox + s * r.dx, y = r.oy + s * r.dy, z = r.oz + s * r.dz;
-  return {under > 0 ? s : kNowhere, row.light[0] * x + (row.light[1] * y + row.light[2] * z)};
+  return {under > 0 ? s : kNowhere, row.light[0] * x + (row.light[1] * y + row.light[2] * z), x, y,
+          z};
 }
 
 [[gnu::always_inline]] inline Hit ellipsoid_hit(const Ray& r, const RayRow& row) {
@@ -70,8 +78,10 @@ struct Hit {
               s = (-b - root(under)) / a;
   const float x = (r.ox + s * r.dx) * row.size[0], y = (r.oy + s * r.dy) * row.size[1],
               z = (r.oz + s * r.dz) * row.size[2];  // size: inverse semi-axes
-  return {under > 0 ? s : kNowhere, (row.light[0] * x + (row.light[1] * y + row.light[2] * z)) /
-                                        std::sqrt(x * x + (y * y + z * z))};
+  const float length = std::sqrt(x * x + (y * y + z * z));
+  return {under > 0 ? s : kNowhere,
+          (row.light[0] * x + (row.light[1] * y + row.light[2] * z)) / length, x / length,
+          y / length, z / length};
 }
 
 [[gnu::always_inline]] inline Hit cuboid_hit(const Ray& r, const RayRow& row) {
@@ -87,7 +97,11 @@ struct Hit {
               along_y = r.dy > 0 ? -row.light[1] : row.light[1],
               along_z = r.dz > 0 ? -row.light[2] : row.light[2];
   const float across = nx > ny ? along_x : along_y;
-  return {enter < leave ? enter : kNowhere, xy > nz ? across : along_z};
+  const bool side = xy > nz, first = nx > ny;
+  return {enter < leave ? enter : kNowhere, side ? across : along_z,
+          side & first ? (r.dx > 0 ? -1.0F : 1.0F) : 0.0F,
+          side & !first ? (r.dy > 0 ? -1.0F : 1.0F) : 0.0F,
+          side ? 0.0F : (r.dz > 0 ? -1.0F : 1.0F)};
 }
 
 [[gnu::always_inline]] inline Hit cylinder_hit(const Ray& r, const RayRow& row) {
@@ -101,7 +115,10 @@ struct Hit {
   const float x = r.ox + enter * r.dx, y = r.oy + enter * r.dy;
   const float round = (row.light[0] * x + row.light[1] * y) / radius,
               flat = r.dz > 0 ? -row.light[2] : row.light[2];
-  return {(under > 0) & (enter < leave) ? enter : kNowhere, into > mz - wz ? round : flat};
+  const bool side = into > mz - wz;
+  return {(under > 0) & (enter < leave) ? enter : kNowhere, side ? round : flat,
+          side ? x / radius : 0.0F, side ? y / radius : 0.0F,
+          side ? 0.0F : (r.dz > 0 ? -1.0F : 1.0F)};
 }
 
 [[gnu::always_inline]] inline Hit capsule_hit(const Ray& r, const RayRow& row) {
@@ -118,7 +135,8 @@ struct Hit {
   const float x = r.ox + s * r.dx, y = r.oy + s * r.dy, z = r.oz + s * r.dz - end;
   const float least = under < met ? under : met;
   return {least > 0 ? s : kNowhere,
-          (row.light[0] * x + (row.light[1] * y + row.light[2] * z)) / radius};
+          (row.light[0] * x + (row.light[1] * y + row.light[2] * z)) / radius, x / radius,
+          y / radius, z / radius};
 }
 
 /// Returns the tone of squares, which fades to its mean where squares are small in the picture.
@@ -143,6 +161,43 @@ struct Hit {
   return byte(colour[0]) | (byte(colour[1]) << 8) | (byte(colour[2]) << 16);
 }
 
+/// x to the power of 1 to 128, of x from 0 to 1. What is too small to be seen is zero, because
+/// numbers without a leading one are slow.
+[[gnu::always_inline]] inline float power(float x, int exponent) {
+  constexpr float kUnseen = 1e-18F;
+  float product = 1;
+  for (int bit = 0; bit < 8; ++bit) {
+    const float with = product * x;
+    product = (exponent >> bit & 1) != 0 ? (with > kUnseen ? with : 0.0F) : product;
+    x = x * x > kUnseen ? x * x : 0.0F;
+  }
+  return product;
+}
+
+/// The strength of the highlight at a surface, 0 to 1. Of a ray with directions dx, dy, dz in the
+/// solid's axes, of any length.
+[[gnu::always_inline]] inline float highlight(const Hit& hit, float dx, float dy, float dz,
+                                              const RayRow& row) {
+  const float length = std::sqrt(dx * dx + (dy * dy + dz * dz));
+  const float across = (hit.x * dx + (hit.y * dy + hit.z * dz)) / length,
+              ahead = (row.light[0] * dx + (row.light[1] * dy + row.light[2] * dz)) / length;
+  const float square = 2.0F - 2.0F * ahead,
+              half = (hit.cosine - across) / std::sqrt(square > kSmallest ? square : kSmallest);
+  const float cosine = half > 0 ? (half < 1 ? half : 1.0F) : 0.0F;
+  return hit.cosine > 0 ? power(cosine, row.exponent) : 0.0F;
+}
+
+/// The colour's numbers times a tone, and white, rounded; at most white.
+[[gnu::always_inline]] inline std::uint32_t packed_below_white(const std::array<float, 3>& colour,
+                                                               float tone, float white) {
+  const auto byte = [tone, white](float level) {
+    const float lit = level * tone + white;
+    return static_cast<std::uint32_t>(
+        static_cast<std::int32_t>((lit < kBrightest ? lit : kBrightest) + 0.5F));
+  };
+  return byte(colour[0]) | (byte(colour[1]) << 8) | (byte(colour[2]) << 16);
+}
+
 /// Puts what is nearer into a pixel. With masks, for which compilers have vectors.
 [[gnu::always_inline]] inline void put(float t, std::int32_t number, std::uint32_t colour,
                                        float& depth, std::int32_t& numbers,
@@ -155,7 +210,7 @@ struct Hit {
   colours = (colour & mask) | (colours & ~mask);
 }
 
-template <Hit (*Law)(const Ray&, const RayRow&)>
+template <Hit (*Law)(const Ray&, const RayRow&), bool kMatte>
 [[gnu::always_inline]] inline void cast_row(const RayRow& given) {
   const RayRow row = given;
   const float* const u = row.u;
@@ -171,12 +226,22 @@ template <Hit (*Law)(const Ray&, const RayRow&)>
     const Hit hit = Law(ray, row);
     const float t = row.middle + hit.s;
     const float lit = hit.cosine > 0 ? (hit.cosine < 1 ? hit.cosine : 1.0F) : 0.0F;
-    put(t > static_cast<float>(kNearest) ? t : kNowhere, row.number,
-        packed(row.colour, row.ambient + row.direct * lit), depth[j], numbers[j], colours[j]);
+    const float tone = row.ambient + row.direct * lit;
+    std::uint32_t colour = 0;
+    if constexpr (kMatte)
+      colour = packed(row.colour, tone);
+    else
+      colour = packed_below_white(
+          row.colour, tone + row.emission,
+          row.specular * highlight(hit, ray.dx * row.unit[0], ray.dy * row.unit[1],
+                                   ray.dz * row.unit[2], row));
+    put(t > static_cast<float>(kNearest) ? t : kNowhere, row.number, colour, depth[j], numbers[j],
+        colours[j]);
   }
 }
 
 /// Of a half-space all rays begin at the pinhole: middle = 0.
+template <bool kMatte>
 [[gnu::always_inline]] inline void cast_half_space_row(const RayRow& given) {
   const RayRow row = given;
   const float* const u = row.u;
@@ -194,28 +259,46 @@ template <Hit (*Law)(const Ray&, const RayRow&)>
     const float x = (row.o[0] + near * (row.d[0] + row.x[0] * u[j])) * per_square,
                 y = (row.o[1] + near * (row.d[1] + row.x[1] * u[j])) * per_square;
     const float across = near * footprint / (seen ? -dz : 1.0F);
-    put(seen ? t : kNowhere, row.number,
-        packed(row.colour, tone * tone_of_square(x, y, across, darker)), depth[j], numbers[j],
-        colours[j]);
+    const float tone_here = tone * tone_of_square(x, y, across, darker);
+    std::uint32_t colour = 0;
+    if constexpr (kMatte)
+      colour = packed(row.colour, tone_here);
+    else
+      colour = packed_below_white(
+          row.colour, tone_here + row.emission,
+          row.specular * highlight({t, row.light[2], 0, 0, 1}, row.d[0] + row.x[0] * u[j],
+                                   row.d[1] + row.x[1] * u[j], dz, row));
+    put(seen ? t : kNowhere, row.number, colour, depth[j], numbers[j], colours[j]);
   }
 }
 
-TANGERE_CLONES void cast_ball(const RayRow& row) { cast_row<ball_hit>(row); }
-TANGERE_CLONES void cast_ellipsoid(const RayRow& row) { cast_row<ellipsoid_hit>(row); }
-TANGERE_CLONES void cast_cuboid(const RayRow& row) { cast_row<cuboid_hit>(row); }
-TANGERE_CLONES void cast_cylinder(const RayRow& row) { cast_row<cylinder_hit>(row); }
-TANGERE_CLONES void cast_capsule(const RayRow& row) { cast_row<capsule_hit>(row); }
-TANGERE_CLONES void cast_half_space(const RayRow& row) { cast_half_space_row(row); }
+TANGERE_CLONES void cast_ball(const RayRow& row) { cast_row<ball_hit, true>(row); }
+TANGERE_CLONES void cast_ellipsoid(const RayRow& row) { cast_row<ellipsoid_hit, true>(row); }
+TANGERE_CLONES void cast_cuboid(const RayRow& row) { cast_row<cuboid_hit, true>(row); }
+TANGERE_CLONES void cast_cylinder(const RayRow& row) { cast_row<cylinder_hit, true>(row); }
+TANGERE_CLONES void cast_capsule(const RayRow& row) { cast_row<capsule_hit, true>(row); }
+TANGERE_CLONES void cast_half_space(const RayRow& row) { cast_half_space_row<true>(row); }
+TANGERE_CLONES void cast_bright_ball(const RayRow& row) { cast_row<ball_hit, false>(row); }
+TANGERE_CLONES void cast_bright_ellipsoid(const RayRow& row) {
+  cast_row<ellipsoid_hit, false>(row);
+}
+TANGERE_CLONES void cast_bright_cuboid(const RayRow& row) { cast_row<cuboid_hit, false>(row); }
+TANGERE_CLONES void cast_bright_cylinder(const RayRow& row) { cast_row<cylinder_hit, false>(row); }
+TANGERE_CLONES void cast_bright_capsule(const RayRow& row) { cast_row<capsule_hit, false>(row); }
+TANGERE_CLONES void cast_bright_half_space(const RayRow& row) { cast_half_space_row<false>(row); }
 
-void cast(SolidKind kind, const RayRow& row) {
+/// How rows of a kind of solid are drawn, by whether a colour may be above white.
+using CastRow = void (*)(const RayRow&);
+CastRow cast_of(SolidKind kind, bool bright) {
   switch (kind) {
-    case SolidKind::ball: return cast_ball(row);
-    case SolidKind::ellipsoid: return cast_ellipsoid(row);
-    case SolidKind::cuboid: return cast_cuboid(row);
-    case SolidKind::cylinder: return cast_cylinder(row);
-    case SolidKind::capsule: return cast_capsule(row);
-    case SolidKind::half_space: return cast_half_space(row);
+    case SolidKind::ball: return bright ? cast_bright_ball : cast_ball;
+    case SolidKind::ellipsoid: return bright ? cast_bright_ellipsoid : cast_ellipsoid;
+    case SolidKind::cuboid: return bright ? cast_bright_cuboid : cast_cuboid;
+    case SolidKind::cylinder: return bright ? cast_bright_cylinder : cast_cylinder;
+    case SolidKind::capsule: return bright ? cast_bright_capsule : cast_capsule;
+    case SolidKind::half_space: return bright ? cast_bright_half_space : cast_half_space;
   }
+  return nullptr;
 }
 
 /// Lengths along axis k by those in which the law of a solid counts.
@@ -224,18 +307,23 @@ double unit_of(const ViewSolid& solid, std::size_t k) {
 }
 
 /// What all rows of a solid share.
-RayRow rows_of(const ViewSolid& solid, const Vector3& light, double ambient, double focal,
-               double far) {
+RayRow rows_of(const ViewSolid& solid, const Vector3& light, double ambient, double direct,
+               double focal, double far) {
   const auto single = [](double x) { return static_cast<float>(x); };
   const bool plane = solid.kind == SolidKind::half_space;
   RayRow row{};
   row.middle = single(plane ? 0 : solid.origin[2]);
   row.side = single(plane ? 0 : solid.origin[0]);
-  row.ambient = single(ambient), row.direct = single(1 - ambient);
+  row.ambient = single(ambient), row.direct = single(direct);
+  row.specular = kBrightest * single(direct * std::clamp(solid.specular, 0.0, 1.0));
+  row.exponent = std::clamp(solid.exponent, 1, kLargestExponent);
+  row.emission = single(std::clamp(solid.emission, 0.0, 1.0));
+  row.bright = row.specular > 0 || row.emission > 0 || ambient + direct > 1 + 1e-9;
   row.square = single(solid.square), row.pixel = single(1 / focal);
   row.far = single(far);
   row.number = solid.number;
   for (std::size_t k = 0; k < 3; ++k) {
+    row.unit[k] = single(unit_of(solid, k));
     row.x[k] = single(solid.axes[k][0] / unit_of(solid, k));
     row.size[k] = single(solid.kind == SolidKind::ellipsoid ? 1 / solid.size[k] : solid.size[k]);
     row.light[k] = single(dot(light, solid.axes[k]));
@@ -273,8 +361,8 @@ SceneView::SceneView(const ViewGrid& grid)
 
 double SceneView::ray_row(int row) const { return (row + 0.5 - 0.5 * grid_.rows) / focal_; }
 
-void SceneView::begin(const Vector3& light, double ambient) {
-  light_ = light, ambient_ = ambient;
+void SceneView::begin(const Vector3& light, double ambient, double brightness) {
+  light_ = light, ambient_ = ambient * brightness, direct_ = (1 - ambient) * brightness;
   std::fill(depth_.begin(), depth_.end(), static_cast<float>(grid_.far));
   std::fill(numbers_.begin(), numbers_.end(), kNoSolid);
   std::fill(colours_.begin(), colours_.end(), kSky);
@@ -334,7 +422,8 @@ SceneView::Pixels SceneView::pixels_of(const ViewSolid& solid) const {
 void SceneView::add(const ViewSolid& solid) {
   const Pixels pixels = pixels_of(solid);
   const bool plane = solid.kind == SolidKind::half_space;
-  RayRow row = rows_of(solid, light_, ambient_, focal_, grid_.far);
+  RayRow row = rows_of(solid, light_, ambient_, direct_, focal_, grid_.far);
+  const CastRow cast_row = cast_of(solid.kind, row.bright);
   if (plane && !(dot(solid.axes[2], solid.origin) < 0)) return;  // the pinhole is inside
   row.u = u_.data();
   row.first = pixels.first_col, row.end = pixels.end_col;
@@ -354,7 +443,7 @@ void SceneView::add(const ViewSolid& solid) {
     row.depth = depth_.data() + first;
     row.numbers = numbers_.data() + first;
     row.colours = colours_.data() + first;
-    cast(solid.kind, row);
+    cast_row(row);
   }
 }
 

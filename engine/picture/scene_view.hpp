@@ -15,6 +15,7 @@ namespace tangere {
 
 /// Depths below it are in front of the pinhole, and not seen [m].
 inline constexpr double kNearest = 1e-3;
+inline constexpr int kLargestExponent = 128;  ///< of a highlight
 /// The number of a pixel in which there is nothing.
 inline constexpr std::int32_t kNoSolid = -1;
 
@@ -40,6 +41,9 @@ struct ViewSolid {
   /// or capsule, which lie along z [m]. A half-space z < 0 has none.
   Vector3 size{};
   std::array<double, 3> colour{};  ///< R, G, B, 0 to 1
+  double specular = 0;             ///< strength of its highlight, 0 to 1
+  int exponent = 64;               ///< of the highlight, 1 to kLargestExponent
+  double emission = 0;             ///< share of its colour that it emits, 0 to 1
   /// Of a half-space: sides of squares in two tones [m]; 0: it has one tone.
   double square = 0;
 };
@@ -55,9 +59,12 @@ class SceneView {
  public:
   explicit SceneView(const ViewGrid& grid);
 
-  /// Empties the picture. `light`: unit, to the lamp; `ambient`: share of light from everywhere. A
-  /// surface with normal n has its colour times ambient + (1 - ambient) max(0, n·light).
-  void begin(const Vector3& light, double ambient);
+  /// Empties the picture. `light`: unit, to the lamp, or zero for none; `ambient`: share of light
+  /// from everywhere; `brightness`: factor of all light. A surface with normal n and the ray d, unit,
+  /// has its colour times brightness (ambient + (1 - ambient) max(0, n·light)) + emission, and
+  /// white times brightness (1 - ambient) specular max(0, n·h)^exponent where n·light > 0, with h
+  /// halfway between light and -d; at most white.
+  void begin(const Vector3& light, double ambient, double brightness = 1);
   void add(const ViewSolid& solid);
   /// The size of `place` has no effect.
   void add(const ViewMesh& mesh, const ViewSolid& place);
@@ -90,8 +97,8 @@ class SceneView {
   ViewGrid grid_;
   double focal_;  // [pixels]
   Vector3 light_{0, 0, -1};
-  double ambient_ = 1;
-  std::vector<float> u_;  // (cols) of the rays
+  double ambient_ = 1, direct_ = 0;  // times the brightness
+  std::vector<float> u_;             // (cols) of the rays
   std::vector<float> depth_;
   std::vector<std::int32_t> numbers_;
   std::vector<std::uint32_t> colours_;

@@ -23,6 +23,17 @@ CameraAxes axes_of(const CameraDescription& camera) {
   return axes;
 }
 
+double* camera_number(CameraDescription& camera, NumberField field, int component) {
+  const auto k = static_cast<std::size_t>(component);
+  switch (field) {
+    case NumberField::pos: return &camera.position[k];
+    case NumberField::look: return &camera.target[k];
+    case NumberField::light: return &camera.light[k];
+    case NumberField::ambient: return &camera.ambient;
+    default: return &camera.brightness;
+  }
+}
+
 std::string camera_fault(const CameraDescription& camera) {
   const Vector3 view = camera.target - camera.position;
   if (!(length(view) > 0)) return "pos and look are the same point; expected two";

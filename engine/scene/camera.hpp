@@ -6,6 +6,7 @@
 
 #include "engine/base/error.hpp"
 #include "engine/base/vector3.hpp"
+#include "engine/scene/number_address.hpp"
 
 namespace tangere {
 
@@ -23,10 +24,15 @@ struct CameraDescription {
   double far = 10;                  ///< depth beyond which nothing is seen, and that of the sky [m]
   Vector3 light{0.35, -0.6, 0.75};  ///< points to the lamp, which is far away, world axes
   double ambient = 0.35;            ///< share of light that comes from everywhere
+  double brightness = 1;            ///< factor of all light
   double noise = 0;                 ///< deviation of every number of a picture [grey levels]
   double gain = 0;                  ///< deviation of a factor per channel and episode
   Source source;
 };
+
+/// Returns the number of a camera that `field` and `component` (0 to 2) name: pos, look, light,
+/// ambient or brightness.
+double* camera_number(CameraDescription& camera, NumberField field, int component);
 
 /// Sides of the squares of the ground in pictures of cameras [m].
 inline constexpr double kGroundSquare = 0.05;

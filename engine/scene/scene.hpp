@@ -159,6 +159,9 @@ struct BodyDescription {
   double gravity_share = 1;  ///< of gravity that acts on it; the same on one link
   /// What cameras see of an abstract body, body frame; null: nothing.
   std::shared_ptr<const MeshShape> surface = nullptr;
+  double specular = 0;     ///< strength of the highlight of a camera's lamp, 0 to 1
+  double shininess = 0.5;  ///< the smaller the highlight the larger: its exponent is 128 of it
+  double emission = 0;     ///< share of its colour that it emits in pictures of cameras
 };
 
 /// A link: one joint to the parent link (or the world) and one body that moves with it.

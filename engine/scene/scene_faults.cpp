@@ -53,6 +53,11 @@ double least_of(const Distribution& d) {
   return d.values.empty() ? 0 : *std::ranges::min_element(d.values);
 }
 
+double most_of(const Distribution& d) {
+  if (d.kind != Distribution::Kind::list) return d.b;
+  return d.values.empty() ? 0 : *std::ranges::max_element(d.values);
+}
+
 constexpr const char* kTurnsFreely =
     "friction of a joint that turns freely; expected a joint of another type";
 
@@ -125,6 +130,13 @@ std::string varying_number_fault(const Scene& scene, const SceneNumber& n) {
                                  })
                  ? ""
                  : "the scene has no such loop, or it is no weld";
+    case NumberOwner::camera:
+      return std::ranges::find(scene.cameras, n.name, &CameraDescription::name) ==
+                     scene.cameras.end()
+                 ? "the scene has no such camera"
+                 : (n.component >= 0 && n.component < 3
+                        ? ""
+                        : fmt::format("index {} is none of 0 to 2", n.component));
     default: return "";
   }
 }
@@ -365,10 +377,13 @@ std::string varying_value_fault(const SceneNumber& n, double value) {
 std::string variation_fault(const Scene& scene, const RandomizationDescription& d) {
   const SceneNumber& n = d.number;
   std::string fault = first_of(varying_number_fault(scene, n), tie_fault(scene, d));
-  const bool bounded = !is_of_start(n) && n.field != Field::pos;
+  const bool bounded =
+      !is_of_start(n) && n.field != Field::pos && n.field != Field::look && n.field != Field::light;
   if (fault.empty() && bounded && d.distribution.kind == Distribution::Kind::normal)
     fault = "normal can draw a negative value; expected uniform, log_uniform or list";
-  if (fault.empty() && bounded) fault = varying_value_fault(n, least_of(d.distribution));
+  if (fault.empty() && bounded)
+    fault = first_of(varying_value_fault(n, least_of(d.distribution)),
+                     varying_value_fault(n, most_of(d.distribution)));
   return fault.empty() ? "" : "'" + name_of(n) + "' varies, but " + fault;
 }
 

@@ -13,7 +13,7 @@ using Owner = NumberOwner;
 using Field = NumberField;
 
 constexpr const char* kOwners[] = {"contact", "ground", "tactile", "body",
-                                   "joint",   "motor",  "loop"};
+                                   "joint",   "motor",  "loop",    "camera"};
 
 bool is_turning(Field field) {
   return field == Field::turning_damping || field == Field::turning_stiffness;
@@ -102,6 +102,13 @@ const double* layer_number(const Scene& scene, const SceneNumber& n) {
   return n.field == Field::thickness ? &at->material->thickness : &at->layer->poisson;
 }
 
+const double* number_of_camera(const Scene& scene, const SceneNumber& n) {
+  const auto at = std::ranges::find(scene.cameras, n.name, &CameraDescription::name);
+  if (at == scene.cameras.end() || n.component < 0 || n.component > 2) return nullptr;
+  // NOLINTNEXTLINE(cppcoreguidelines-pro-type-const-cast): returned as const
+  return camera_number(const_cast<CameraDescription&>(*at), n.field, n.component);
+}
+
 /// Returns nullptr where the scene has no such number.
 const double* find_number(const Scene& scene, const SceneNumber& n) {
   number_kind(n.owner, n.field);  // throws if there is no such kind
@@ -114,6 +121,7 @@ const double* find_number(const Scene& scene, const SceneNumber& n) {
     return found;
   }
   if (n.owner == Owner::loop) return loop_number(scene, n);
+  if (n.owner == Owner::camera) return number_of_camera(scene, n);
   if (n.field == Field::thickness || n.field == Field::poisson) return layer_number(scene, n);
   if (n.owner == Owner::body || n.owner == Owner::joint) {
     const LinkDescription* const link = link_of(scene, n);
@@ -140,9 +148,9 @@ const double& found_number(const Scene& scene, const SceneNumber& number) {
 }  // namespace
 
 std::uint64_t element_of(NumberOwner owner) {
-  constexpr std::uint64_t kElementOf[] = {kPairContact, kGroundContact,         kTactile | kLayer,
-                                          kBody,        kJoint | kInitialJoint, kMotor,
-                                          kLoops};
+  constexpr std::uint64_t kElementOf[] = {
+      kPairContact, kGroundContact, kTactile | kLayer, kBody, kJoint | kInitialJoint, kMotor,
+      kLoops,       kCamera};
   return kElementOf[static_cast<int>(owner)];
 }
 

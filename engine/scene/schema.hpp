@@ -66,13 +66,14 @@ enum Element : std::uint64_t {
   kPoint = 1ULL << 41,  ///< in <path>, like those below
   kWrap = 1ULL << 42,
   kPulley = 1ULL << 43,
+  kVaryCamera = 1ULL << 44,  ///< in <randomize>
 };
-inline constexpr int kElements = 44;
+inline constexpr int kElements = 45;
 inline constexpr std::uint64_t kContacts = kGroundContact | kPairContact,
                                kTouching = kContacts | kTactile, kLoops = kConnect | kWeld,
                                kVarying = kVaryJoint | kVaryMotor | kVaryGround | kVaryPair |
                                           kVaryTactile | kVaryBody | kVarySurface | kVaryConnect |
-                                          kVaryWeld;
+                                          kVaryWeld | kVaryCamera;
 /// The name in scene files.
 const char* to_string(Element element);
 

@@ -50,6 +50,12 @@ std::vector<SceneNumber> variable_numbers(const Scene& scene) {
   for (const LoopDescription& loop : scene.loops)
     for (std::size_t k = 0; k < (loop.weld ? 4U : 2U); ++k)
       add({NumberOwner::loop, loop_field(k), loop.name});
+  for (const CameraDescription& camera : scene.cameras) {
+    for (const NumberField field : {NumberField::pos, NumberField::look, NumberField::light})
+      for (int axis = 0; axis < 3; ++axis) add({NumberOwner::camera, field, camera.name, axis});
+    for (const NumberField field : {NumberField::ambient, NumberField::brightness})
+      add({NumberOwner::camera, field, camera.name});
+  }
   return numbers;
 }
 

@@ -27,12 +27,13 @@ constexpr std::array<double, 3> kGroundColour{0.62, 0.62, 0.6};
 constexpr std::size_t kMostKeptBytes = 64U << 20;  // of pictures of a block, for each thread
 constexpr float kWhiteLevel = 255;
 
+bool is_finite(const Vector3& v) {
+  return std::ranges::all_of(v, [](double x) { return std::isfinite(x); });
+}
+
 /// Whether its place is numbers.
 bool has_place(const ViewSolid& solid) {
-  const auto finite = [](const Vector3& v) {
-    return std::ranges::all_of(v, [](double x) { return std::isfinite(x); });
-  };
-  return finite(solid.origin) && std::ranges::all_of(solid.axes, finite);
+  return is_finite(solid.origin) && std::ranges::all_of(solid.axes, is_finite);
 }
 
 struct SizedSolid {
@@ -54,6 +55,14 @@ std::optional<SizedSolid> solid_of_shape(const Shape& shape) {
   if (std::holds_alternative<PlaneShape>(shape)) return SizedSolid{SolidKind::half_space, {}};
   return std::nullopt;
 }
+
+constexpr double kMostExponent = kLargestExponent;
+
+/// A number of the camera that varies.
+struct VaryingCameraNumber {
+  int randomization;
+  SceneNumber number;
+};
 
 /// A number of a body's size that varies.
 struct VaryingShapeNumber {
@@ -94,6 +103,9 @@ struct CameraReading::Impl {
   Model model;
   const CameraDescription& description;
   const CompiledCamera& camera;
+  CameraDescription drawn;  // as the environment at hand has it
+  Frame<double> own_frame;  // of its axes, in the body's or the world's
+  std::vector<VaryingCameraNumber> own_numbers;
   std::vector<const MeshShape*> meshes;  // of bodies; null: it has none
   // Of bodies, with the sizes of the environment at hand. Of a mesh only its scale.
   std::vector<Shape> shapes;
@@ -110,7 +122,9 @@ struct CameraReading::Impl {
   Impl(const Model& m, int number)
       : model(m),
         description(model.scene().cameras[std::size_t(number)]),
-        camera(compiled(model).cameras[std::size_t(number)]) {
+        camera(compiled(model).cameras[std::size_t(number)]),
+        drawn(description),
+        own_frame(camera.frame) {
     const Scene& scene = model.scene();
     for (std::size_t b = 0; b < scene.links.size(); ++b) {
       const BodyDescription& body = scene.links[b].body;
@@ -126,6 +140,8 @@ struct CameraReading::Impl {
     }
     for (std::size_t k = 0; k < scene.randomizations.size(); ++k) {
       const SceneNumber& n = scene.randomizations[k].number;
+      if (n.owner == NumberOwner::camera && n.name == description.name)
+        own_numbers.push_back({static_cast<int>(k), n});
       if (n.owner != NumberOwner::body || size_index(n) < 0) continue;
       for (std::size_t b = 0; b < scene.links.size(); ++b)
         if (scene.links[b].body.name == n.name)
@@ -158,20 +174,31 @@ struct CameraReading::Impl {
     solids.push_back(solid);
   }
 
+  /// Sets the camera's own numbers to those of an environment.
+  void place_camera(const Batch& batch, int environment) {
+    for (const auto& [randomization, number] : own_numbers)
+      *camera_number(drawn, number.field, number.component) =
+          batch.randomized_value(environment, randomization);
+    if (!own_numbers.empty()) own_frame = camera_frame(drawn);
+  }
+
   /// Lists what is seen in the camera's axes.
   void list_solids(const PadReader& reader, const Batch& batch, int environment) {
     const int group = environment % kBlock / kGroup, lane = environment % kGroup;
     const Scene& scene = model.scene();
     for (const VaryingShapeNumber& n : varying)
       *size_number(shapes[n.body], n.which) = batch.randomized_value(environment, n.randomization);
-    const Frame<double> eye = compose(pose_of(reader, camera.body, group, lane), camera.frame);
+    place_camera(batch, environment);
+    const Frame<double> eye = compose(pose_of(reader, camera.body, group, lane), own_frame);
     solids.clear();
     key.clear();
     for (const std::size_t b : bodies) {
       ViewSolid solid;
       solid.number = static_cast<std::int32_t>(b);
-      const std::array<double, 4>& rgba = scene.links[b].body.rgba;
-      solid.colour = {rgba[0], rgba[1], rgba[2]};
+      const BodyDescription& body = scene.links[b].body;
+      solid.colour = {body.rgba[0], body.rgba[1], body.rgba[2]};
+      solid.specular = body.specular, solid.emission = body.emission;
+      solid.exponent = static_cast<int>(std::lround(kMostExponent * body.shininess));
       if (const auto sized = solid_of_shape(shapes[b]))
         solid.kind = sized->kind, solid.size = sized->size;
       else
@@ -186,8 +213,10 @@ struct CameraReading::Impl {
       ground.square = kGroundSquare;
       put_solid(eye, frame_of_ground(*scene.ground), ground);
     }
-    light = turned_into(eye, description.light);
+    light = turned_into(eye, drawn.light);
+    if (!is_finite(light)) light = {0, 0, 0};  // no direction: no lamp
     key.insert(key.end(), light.begin(), light.end());
+    key.insert(key.end(), {drawn.ambient, drawn.brightness});
     for (const ViewSolid& s : solids) {
       for (const Vector3& axis : s.axes) key.insert(key.end(), axis.begin(), axis.end());
       key.insert(key.end(), s.origin.begin(), s.origin.end());
@@ -196,7 +225,7 @@ struct CameraReading::Impl {
   }
 
   void draw(SceneView& view) const {
-    view.begin(light, description.ambient);
+    view.begin(light, drawn.ambient, drawn.brightness);
     for (const ViewSolid& solid : solids) {
       const auto b = static_cast<std::size_t>(solid.number);
       const MeshShape* const mesh = b < meshes.size() ? meshes[b] : nullptr;

@@ -32,6 +32,7 @@ Purpose purpose_of(const SceneNumber& number) {
       return number.field == NumberField::pos ? Purpose::body : Purpose::joint;
     case NumberOwner::motor: return Purpose::joint;
     case NumberOwner::body: return Purpose::body;
+    case NumberOwner::camera: return Purpose::camera;
     case NumberOwner::tactile: break;
   }
   return Purpose::tactile;

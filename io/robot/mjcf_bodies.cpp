@@ -426,11 +426,11 @@ class Bodies {
     if (node.has("material")) {
       const auto& materials = part.file().materials;
       const auto material = materials.find(node.text("material"));
-      if (material != materials.end()) piece.rgba = material->second;
+      if (material != materials.end()) piece.looks = material->second;
     }
     if (!node.has("rgba")) return;
     const std::vector<double> x = node.numbers("rgba", 4);
-    piece.rgba = {x[0], x[1], x[2], x[3]};
+    piece.looks.rgba = {x[0], x[1], x[2], x[3]};
   }
 
   /// Half sizes of a geom: `count` numbers, all positive.

@@ -168,6 +168,25 @@ void read_mesh(MjcfFile& file, const RobotNode& node) {
   file.meshes.emplace(name, MjcfMesh{node, kInertias[inertia]});
 }
 
+/// A material that gives neither specular nor shininess has no highlight here.
+void read_material(MjcfFile& file, const RobotNode& node) {
+  constexpr double kUsual = 0.5;  // MuJoCo's own
+  Looks looks;
+  if (node.has("rgba")) {
+    const std::vector<double> x = node.numbers("rgba", 4);
+    looks.rgba = {x[0], x[1], x[2], x[3]};
+  }
+  const auto share = [&](const char* name, double usual) {
+    return std::clamp(node.number(name, usual), 0.0, 1.0);
+  };
+  if (node.has("specular") || node.has("shininess")) {
+    looks.specular = share("specular", kUsual);
+    looks.shininess = share("shininess", kUsual);
+  }
+  looks.emission = share("emission", 0);
+  file.materials[node.text("name")] = looks;
+}
+
 void read_asset(MjcfFile& file, const RobotNode& section) {
   const Words known = {{"mesh"},
                        {"material"},
@@ -187,9 +206,7 @@ void read_asset(MjcfFile& file, const RobotNode& section) {
     }
     node.check(mjcf_words("material"));
     static_cast<void>(node.parts({{"layer", Fate::idle, kSight}}));
-    if (!node.has("rgba")) continue;
-    const std::vector<double> x = node.numbers("rgba", 4);
-    file.materials[node.text("name")] = {x[0], x[1], x[2], x[3]};
+    read_material(file, node);
   }
 }
 

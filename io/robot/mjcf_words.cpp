@@ -156,9 +156,9 @@ std::map<std::string, Words> all_words() {
                  {"maxhullvert", Fate::idle, "meshes are not replaced by hulls"},
                  {"octree_maxdepth", Fate::idle, kSolverSetting},
                  {"material", Fate::idle, kSight}};
-  all["material"] = {{"name"}, {"class"}, {"rgba"}};
-  for (const char* name : {"texture", "texrepeat", "texuniform", "emission", "specular",
-                           "shininess", "reflectance", "metallic", "roughness"})
+  all["material"] = {{"name"}, {"class"}, {"rgba"}, {"specular"}, {"shininess"}, {"emission"}};
+  for (const char* name :
+       {"texture", "texrepeat", "texuniform", "reflectance", "metallic", "roughness"})
     all["material"].push_back({name, Fate::idle, kSight});
   all["general"] =
       actuator_words({"dyntype", "gaintype", "biastype", "gainprm", "biasprm", "inheritrange"});

@@ -106,12 +106,18 @@ class RobotNames {
   std::set<std::string> names_;
 };
 
+/// How a piece looks in pictures: as BodyDescription has it.
+struct Looks {
+  std::array<double, 4> rgba{0.7, 0.7, 0.7, 1};
+  double specular = 0, shininess = 0.5, emission = 0;
+};
+
 /// A piece of a link: its shape in the link's frame, and how heavy it is.
 struct RobotPiece {
   Shape shape;
   Pose pose;
   double density = 0;  ///< [kg/m³]; 0: it has no mass of its own
-  std::array<double, 4> rgba{0.7, 0.7, 0.7, 1};
+  Looks looks;
   bool touches = true;  ///< false: it has a mass, and nothing touches it
   MeshFile mesh;        ///< of mesh shapes
   std::string origin;   ///< "<collision>", "<geom>"

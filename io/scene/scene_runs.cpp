@@ -168,6 +168,30 @@ void read_loop_variation(const Scene& scene, const SceneElement& node,
   d.number.field = read_field(node, NumberOwner::loop);
 }
 
+/// Reads a number of a camera's pose or light.
+void read_camera_variation(const Scene& scene, const SceneElement& node,
+                           RandomizationDescription& d) {
+  d.number.owner = NumberOwner::camera;
+  d.number.name = node.text("name");
+  std::vector<std::string> names;
+  for (const CameraDescription& camera : scene.cameras) names.push_back(camera.name);
+  if (std::ranges::find(names, d.number.name) == names.end())
+    node.fail("no camera is named '" + d.number.name + "'" + suggestion(d.number.name, names));
+  int found = int{node.has("field")};
+  const auto indexed = [&](const char* attribute, NumberField field) {
+    if (!node.has(attribute)) return;
+    ++found;
+    d.number.field = field;
+    d.number.component = node.integer(attribute);
+  };
+  indexed("pos", NumberField::pos);
+  indexed("look", NumberField::look);
+  indexed("light", NumberField::light);
+  if (found != 1)
+    node.fail("expected exactly one of pos, look, light (the index of an axis) and field");
+  if (node.has("field")) d.number.field = read_field(node, NumberOwner::camera);
+}
+
 /// Points of a contact of surfaces follow the kn of the scene. Warns where far larger ones are
 /// drawn.
 void warn_of_stiffer_draws(const Scene& scene, const SceneElement& node,
@@ -307,6 +331,8 @@ void read_randomize(Scene& scene, const SceneNode& section) {
       read_state_variation(scene, node, d);
     } else if (node.of() == kVaryConnect || node.of() == kVaryWeld) {
       read_loop_variation(scene, node, d);
+    } else if (node.of() == kVaryCamera) {
+      read_camera_variation(scene, node, d);
     } else if (node.of() == kVaryBody) {
       read_body_variation(scene, node, d);
     } else {

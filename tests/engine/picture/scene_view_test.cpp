@@ -268,6 +268,128 @@ TEST(SceneView, AMeshOfACuboidIsTheCuboid) {
   }
 }
 
+Posed glossy(Posed one) {
+  one.solid.colour = {0.6, 0.3, 0.1};
+  one.solid.specular = 0.8, one.solid.exponent = 20, one.solid.emission = 0.1;
+  return one;
+}
+
+/// The normal of a solid at a pixel, in the camera's axes.
+Vector3 normal_at(const Posed& of, const Vector3& ray, double depth) {
+  const Vector3 n = distance_at(of, ray, depth).normal;
+  Vector3 turned{};
+  for (std::size_t k = 0; k < 3; ++k) turned = turned + n[k] * of.solid.axes[k];
+  return turned;
+}
+
+/// Levels by the law that scene_view.hpp states, with the normal of the shape's distance.
+std::array<double, 3> levels_by_law(const ViewSolid& of, const Vector3& n, const Vector3& ray,
+                                    const Vector3& light, double ambient, double brightness) {
+  const double direct = brightness * (1 - ambient), cosine = dot(n, light);
+  const double high =
+      cosine > 0 ? std::pow(std::max(0.0, dot(n, unit(light - unit(ray)))), of.exponent) : 0;
+  std::array<double, 3> levels{};
+  for (std::size_t c = 0; c < 3; ++c)
+    levels[c] =
+        std::min(255.0, 255 * (of.colour[c] * (brightness * ambient +
+                                               direct * std::max(0.0, cosine) + of.emission) +
+                               of.specular * direct * high));
+  return levels;
+}
+
+TEST(SceneView, HighlightsAreThoseOfTheLaw) {
+  const Vector3 light = unit(Vector3{-0.2, -0.3, -0.9});
+  constexpr double kAmbient = 0.3, kBrightness = 1.2;
+  int bright = 0;
+  for (int seed = 0; seed < 3; ++seed)
+    for (const Posed& given : posed_shapes(seed)) {
+      const Posed one = glossy(given);
+      SceneView view(square_grid());
+      view.begin(light, kAmbient, kBrightness);
+      view.add(one.solid);
+      int compared = 0, other = 0;
+      for (int i = 0; i < kPixels; ++i)
+        for (int j = 0; j < kPixels; ++j) {
+          const std::size_t k = std::size_t(i * kPixels + j);
+          if (view.numbers()[k] != 7) continue;
+          const Vector3 ray = ray_of(i, j), n = normal_at(one, ray, view.depth()[k]);
+          if (-dot(n, unit(ray)) < 0.1) continue;  // grazing
+          const auto levels = levels_by_law(one.solid, n, ray, light, kAmbient, kBrightness);
+          ++compared;
+          bool same = true;
+          for (std::size_t c = 0; c < 3; ++c) {
+            const double level = double(view.colours()[k] >> (8 * c) & 255U);
+            same = same && std::abs(level - levels[c]) < 1;
+          }
+          other += same ? 0 : 1;
+          bright += levels[2] > 100 ? 1 : 0;  // of 0.1: a highlight
+        }
+      EXPECT_GT(compared, 60) << shape_name(one.shape);
+      EXPECT_LE(other, compared / 50) << shape_name(one.shape) << ' ' << seed;  // on edges
+    }
+  EXPECT_GT(bright, 100);
+  SceneView view(square_grid());
+  ViewSolid floor = floor_below(0.2);
+  floor.specular = 0.9, floor.exponent = 5;
+  const Vector3 behind = unit(Vector3{0.1, -0.5, 0.8});
+  view.begin(behind, kAmbient);
+  view.add(floor);
+  for (int i = 40; i < kPixels; ++i) {
+    const auto levels = levels_by_law(floor, {0, -1, 0}, ray_of(i, 20), behind, kAmbient, 1);
+    ASSERT_NEAR(view.colours()[std::size_t(i * kPixels + 20)] & 255U, levels[0], 1) << i;
+  }
+}
+
+TEST(SceneView, AHighlightOfAMeshIsThatOfItsFaces) {
+  for (int seed = 0; seed < 3; ++seed) {
+    const Posed one = glossy(posed_shapes(seed)[2]);
+    const Triangles box = box_of(one.solid.size);
+    SceneView solid(square_grid()), mesh(square_grid());
+    for (SceneView* view : {&solid, &mesh}) view->begin(unit(Vector3{-0.2, -0.3, -0.9}), 0.3);
+    solid.add(one.solid);
+    mesh.add(ViewMesh{box.vertices, box.list, 1}, one.solid);
+    int other = 0;
+    for (std::size_t k = 0; k < mesh.grid().pixels(); ++k)
+      for (int c = 0; c < 24; c += 8) {
+        const int a = int(mesh.colours()[k] >> c & 255U), b = int(solid.colours()[k] >> c & 255U);
+        other += std::abs(a - b) > 1 ? 1 : 0;
+      }
+    EXPECT_LE(other, 24) << seed;
+  }
+}
+
+/// What has no highlight has the bytes of a highlight that is too weak to be seen, and every
+/// instruction set has the same bytes, whose sum stands here.
+TEST(SceneView, MaterialsHaveFixedBytesAndNoneIsNone) {
+  std::uint64_t sum = 14695981039346656037ULL;
+  for (Posed one : posed_shapes(1)) {
+    SceneView plain(square_grid()), weak(square_grid()), shiny(square_grid());
+    for (SceneView* view : {&plain, &weak, &shiny}) view->begin({0, 0, -1}, 0.3);
+    plain.add(one.solid);
+    one.solid.specular = 1e-30;
+    weak.add(one.solid);
+    EXPECT_TRUE(std::ranges::equal(plain.colours(), weak.colours())) << shape_name(one.shape);
+    shiny.add(glossy(one).solid);
+    EXPECT_FALSE(std::ranges::equal(plain.colours(), shiny.colours())) << shape_name(one.shape);
+    for (const std::uint32_t colour : shiny.colours()) sum = (sum ^ colour) * 1099511628211ULL;
+  }
+  EXPECT_EQ(sum, 0ULL);
+}
+
+/// Light above 1 ends at white, in solids and meshes.
+TEST(SceneView, BrightnessEndsAtWhite) {
+  const Posed one = posed_shapes(1)[2];
+  const Triangles box = box_of(one.solid.size);
+  SceneView solid(square_grid()), mesh(square_grid());
+  for (SceneView* view : {&solid, &mesh}) view->begin({0, 0, -1}, 0.3, 50);
+  solid.add(one.solid);
+  mesh.add(ViewMesh{box.vertices, box.list, 1}, one.solid);
+  const auto middle = static_cast<std::size_t>(std::ranges::find(mesh.numbers(), one.solid.number) -
+                                               mesh.numbers().begin());
+  EXPECT_EQ(mesh.colours()[middle], 255U | (255U << 8));  // red 1, green 0.5, no blue
+  EXPECT_EQ(solid.colours()[middle], mesh.colours()[middle]);
+}
+
 TEST(SceneView, AClosedMeshHasNoGaps) {
   ViewSolid at = posed_shapes(0)[0].solid;
   const double radius = 0.05;

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <set>
 
+#include "engine/scene/scene_number.hpp"
 #include "engine/sense/form_map.hpp"
 #include "engine/sense/readout.hpp"
 #include "tests/engine/scenes.hpp"
@@ -203,6 +204,90 @@ TEST(CameraReading, NoiseHasItsDeviationAndOtherCamerasOtherNoise) {
   EXPECT_NE(view<std::uint8_t>(scene, FieldForm::view_rgb), noisy);
   scene.cameras[0].noise = 0;
   EXPECT_EQ(view<std::uint8_t>(scene, FieldForm::view_rgb), plain);
+}
+
+/// The scene with the camera's pose and light drawn.
+Scene with_draws(Scene scene) {
+  using Field = NumberField;
+  const auto draw = [&](Field field, int component, double low, double high) {
+    scene.randomizations.push_back({{NumberOwner::camera, field, "eye", component},
+                                    {Distribution::Kind::uniform, low, high, {}},
+                                    {}});
+  };
+  draw(Field::pos, 0, -0.05, 0.05), draw(Field::pos, 2, 0.4, 0.6);
+  draw(Field::look, 1, -0.03, 0.03);
+  draw(Field::light, 0, -1, 1), draw(Field::light, 1, -1, 1);
+  draw(Field::ambient, 0, 0.1, 0.6), draw(Field::brightness, 0, 0.5, 1.5);
+  return scene;
+}
+
+/// Each environment has the picture of a scene with its numbers, alone and in any batch.
+TEST(CameraReading, PoseAndLightAreThoseThatAreDrawn) {
+  Scene scene = watched();
+  scene.links[0].body.specular = 0.7;
+  const Model model(with_draws(scene));
+  constexpr int kCount = 19;
+  Batch batch(model, kCount, 3);
+  Readout readout(model);
+  const auto all = read_view<std::uint8_t>(readout, batch, FieldForm::view_rgb);
+  const std::size_t size = all.size() / kCount;
+  std::set<std::vector<std::uint8_t>> different;
+  for (const int e : {0, 1, 7, 16, 18}) {
+    Scene same = scene;
+    for (std::size_t k = 0; k < model.scene().randomizations.size(); ++k)
+      number_in(same, model.scene().randomizations[k].number) =
+          batch.randomized_value(e, static_cast<int>(k));
+    const auto begin = all.begin() + std::ptrdiff_t(size) * e;
+    const std::vector<std::uint8_t> own(begin, begin + std::ptrdiff_t(size));
+    EXPECT_EQ(view<std::uint8_t>(same, FieldForm::view_rgb), own) << e;
+    Batch alone(model, 1, 3, e);
+    Readout other(model);
+    EXPECT_EQ(read_view<std::uint8_t>(other, alone, FieldForm::view_rgb), own) << e;
+    different.insert(own);
+  }
+  EXPECT_EQ(different.size(), 5U);
+  const Batch otherwise(model, kCount, 4);
+  EXPECT_NE(read_view<std::uint8_t>(readout, otherwise, FieldForm::view_rgb), all);
+}
+
+/// A number that is set later than the picture was kept is seen; a camera without a direction sees
+/// nothing, and a lamp without one does not shine.
+TEST(CameraReading, NumbersThatAreSetAreSeen) {
+  const Model model(with_draws(watched()));
+  Batch batch(model, 1, 3);
+  Readout readout(model);
+  const auto set = [&](int k, double value) {
+    batch.set_randomized_value(0, k, value);
+    return read_view<std::uint8_t>(readout, batch, FieldForm::view_rgb);
+  };
+  const auto dark = set(6, 0.5), bright = set(6, 1);
+  EXPECT_NEAR(bright[3 * kMiddle], 2 * dark[3 * kMiddle], 1);
+  const auto even = set(5, 1);  // light from everywhere
+  EXPECT_EQ(even[3 * kMiddle], 255);
+  const Scene turned = [] {
+    Scene s = watched();
+    s.cameras[0].light = {0, 0, 1e-200};  // its square is 0
+    return s;
+  }();
+  EXPECT_EQ(view<std::uint8_t>(turned, FieldForm::view_rgb)[3 * kMiddle],
+            std::lround(255 * watched().cameras[0].ambient));
+  Scene blind = watched();
+  blind.randomizations.push_back({{NumberOwner::camera, NumberField::pos, "eye", 2},
+                                  {Distribution::Kind::list, 0, 0, {0}},
+                                  {}});
+  EXPECT_THAT(view<std::int16_t>(blind, FieldForm::view_ids), ::testing::Each(std::int16_t{-1}));
+}
+
+TEST(CameraReading, MaterialsOfBodiesAreSeen) {
+  Scene scene = watched();
+  scene.cameras[0].light = {0, 0, 1};
+  const auto plain = view<std::uint8_t>(scene, FieldForm::view_rgb);
+  scene.links[0].body.specular = 0.5;
+  const auto shiny = view<std::uint8_t>(scene, FieldForm::view_rgb);
+  EXPECT_EQ(plain[3 * kMiddle + 1], 0);
+  EXPECT_GT(shiny[3 * kMiddle + 1], 60);  // half of the lamp's 0.65, about the top
+  scene.links[0].body.specular = 0, scene.links[0].body.emission = 1;
+  EXPECT_EQ(view<std::uint8_t>(scene, FieldForm::view_rgb)[3 * kMiddle], 255);
 }
 
 TEST(CameraReading, IsEmptyWhereNoPlaceIsKnown) {

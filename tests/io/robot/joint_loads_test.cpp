@@ -72,27 +72,28 @@ double limit_of_crank(const Scene& scene) { return scene.links.at(0).joint.limit
 /// A motor on a tendon of twice the crank's angle pulls it from one limit to the other with 5 N m
 /// 3.2 2, also where its own targets lie at one end.
 TEST(JointLoads, LoopsHoldServosOfFixedTendons) {
-  const Scene by_targets = linkage(kFixed, servo("5", "ctrlrange=\"-1.6 1.6\""), "1.4");
-  const Scene by_limits = linkage(kFixed, servo("5"), "1.4", kRange),
-              by_both = linkage(kFixed, servo("5", "ctrlrange=\"1 1.6\""), "1.4", kRange);
-  EXPECT_EQ(by_limits.loops.at(0).stiffness, by_targets.loops.at(0).stiffness);
-  EXPECT_EQ(by_both.loops.at(0).stiffness, by_targets.loops.at(0).stiffness);
-  for (const Scene& scene : {by_targets, by_limits, by_both}) EXPECT_LT(gap_in_motion(scene), 1e-6);
-  EXPECT_LT(limit_of_crank(by_limits), 10) << "the targets are the limits";
+  const Scene with_targets = linkage(kFixed, servo("5", "ctrlrange=\"-1.6 1.6\""), "1.4");
+  const Scene with_limits = linkage(kFixed, servo("5"), "1.4", kRange),
+              with_both = linkage(kFixed, servo("5", "ctrlrange=\"1 1.6\""), "1.4", kRange);
+  EXPECT_EQ(with_limits.loops.at(0).stiffness, with_targets.loops.at(0).stiffness);
+  EXPECT_EQ(with_both.loops.at(0).stiffness, with_targets.loops.at(0).stiffness);
+  for (const Scene& scene : {with_targets, with_limits, with_both})
+    EXPECT_LT(gap_in_motion(scene), 1e-6);
+  EXPECT_LT(limit_of_crank(with_limits), 10) << "the targets are the limits";
 }
 
 /// A tendon from a post to the crank's end, 30 mm from its joint.
 TEST(JointLoads, LoopsAndLimitsHoldMotorsOfSpatialTendons) {
-  const Scene by_targets = linkage(kSpatial, servo("2000", "ctrlrange=\"0.03 0.06\""), "0.04"),
-              by_limits = linkage(kSpatial, servo("2000"), "0.04", kRange),
-              by_force =
+  const Scene with_targets = linkage(kSpatial, servo("2000", "ctrlrange=\"0.03 0.06\""), "0.04"),
+              with_limits = linkage(kSpatial, servo("2000"), "0.04", kRange),
+              with_force =
                   linkage(kSpatial, "<motor tendon=\"t\" ctrlrange=\"-50 0\"/>", "-50", kRange),
-              bare = linkage(kSpatial, "<motor tendon=\"t\" ctrlrange=\"-1e-3 0\"/>", "0", kRange);
-  for (const Scene& scene : {by_targets, by_limits, by_force}) {
-    EXPECT_GT(scene.loops.at(0).stiffness, 50 * bare.loops.at(0).stiffness);
+              weak = linkage(kSpatial, "<motor tendon=\"t\" ctrlrange=\"-1e-3 0\"/>", "0", kRange);
+  for (const Scene& scene : {with_targets, with_limits, with_force}) {
+    EXPECT_GT(scene.loops.at(0).stiffness, 50 * weak.loops.at(0).stiffness);
     EXPECT_LT(gap_in_motion(scene), 1e-7);
   }
-  EXPECT_DOUBLE_EQ(limit_of_crank(by_force), 50 * 0.03 / 0.01);
+  EXPECT_DOUBLE_EQ(limit_of_crank(with_force), 50 * 0.03 / 0.01);
 }
 
 /// A servo presses against a limit with what its targets are beyond it: 20 N m/rad 1.7 rad.

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include "engine/scene/field_form.hpp"
+#include "engine/scene/scene_number.hpp"
 #include "io/scene/scene_reader.hpp"
 #include "tests/io/scene/scene_text.hpp"
 
@@ -35,6 +36,64 @@ std::string line() {
   const std::string text = with_camera(kPlace);
   const auto before = text.substr(0, text.find("<camera"));
   return "eye.xml:" + std::to_string(1 + std::count(before.begin(), before.end(), '\n')) + ": ";
+}
+
+Scene drawn_scene(const std::string& lines) {
+  std::string text = with_camera(kPlace);
+  text.insert(text.find("</tangere>"), "<randomize>\n" + lines + "\n</randomize>\n");
+  return parse_scene(text, "eye.xml").scene;
+}
+std::string message_of_draw(const std::string& line) {
+  try {
+    static_cast<void>(drawn_scene(line));
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(CameraFile, PoseAndLightMayBeDrawn) {
+  const Scene scene = drawn_scene(
+      "<camera name=\"eye\" pos=\"1\" normal=\"-0.4 0.01\"/><camera name=\"eye\" look=\"2\" "
+      "uniform=\"0.01 0.03\"/><camera name=\"eye\" light=\"0\" uniform=\"-1 1\"/>"
+      "<camera name=\"eye\" field=\"ambient\" list=\"0.2 0.5\"/>"
+      "<camera name=\"eye\" field=\"brightness\" log_uniform=\"0.5 2\"/>");
+  std::vector<std::string> names, units;
+  for (const RandomizationDescription& d : scene.randomizations)
+    names.push_back(name_of(d.number)), units.push_back(unit_of(scene, d.number));
+  EXPECT_THAT(names, ElementsAre("camera eye pos[1]", "camera eye look[2]", "camera eye light[0]",
+                                 "camera eye ambient", "camera eye brightness"));
+  EXPECT_THAT(units, ElementsAre("m", "m", "1", "1", "1"));
+  EXPECT_EQ(scene.randomizations[0].distribution.a, -0.4);
+  EXPECT_EQ(number_in(scene, scene.randomizations[1].number), 0.02);
+}
+
+TEST(CameraFile, MistakesInDrawsNameTheLine) {
+  const auto of = [](const std::string& attributes) {
+    return message_of_draw("<camera " + attributes + "/>");
+  };
+  EXPECT_THAT(of("name=\"eyes\" pos=\"0\" uniform=\"0 1\""),
+              HasSubstr("no camera is named 'eyes'; did you mean 'eye'?"));
+  EXPECT_THAT(of("name=\"eye\" uniform=\"0 1\""), HasSubstr("exactly one of pos, look, light"));
+  EXPECT_THAT(of("name=\"eye\" pos=\"0\" field=\"ambient\" uniform=\"0 1\""),
+              HasSubstr("exactly one of pos, look, light"));
+  EXPECT_THAT(of("name=\"eye\" pos=\"3\" uniform=\"0 1\""), HasSubstr("pos=\"3\""));
+  EXPECT_THAT(of("name=\"eye\" field=\"ambient\" uniform=\"0.5 1.5\""),
+              HasSubstr("ambient=\"1.5\""));
+  EXPECT_THAT(of("name=\"eye\" field=\"brightness\" normal=\"1 0.1\""),
+              HasSubstr("normal can draw a negative value"));
+  EXPECT_THAT(of("name=\"eye\" field=\"fov\" uniform=\"40 50\""), HasSubstr("field=\"fov\""));
+}
+
+TEST(CameraFile, BodiesHaveMaterials) {
+  std::string text = with_camera(kPlace);
+  text.insert(text.find("<body ") + 6, "specular=\"0.4\" shininess=\"0.9\" emission=\"0.1\" ");
+  const Scene scene = parse_scene(text, "eye.xml").scene;
+  EXPECT_EQ(scene.links[0].body.specular, 0.4);
+  EXPECT_EQ(scene.links[0].body.shininess, 0.9);
+  EXPECT_EQ(scene.links[0].body.emission, 0.1);
+  text.replace(text.find("specular=\"0.4\""), 14, "specular=\"1.4\"");
+  EXPECT_THROW(parse_scene(text, "eye.xml"), InputError);
 }
 
 TEST(CameraFile, HasItsDefaultsAndItsNumbers) {

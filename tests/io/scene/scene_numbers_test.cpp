@@ -80,6 +80,7 @@ std::string scene_with(const std::string& lines) {
 <tactile name="gel" body="skin" type="rect_array" rect_pos0="-0.004 0.004 -0.005" )"
          R"(rect_pos1="0.004 -0.004 -0.005" axis0="0 -1 0" axis1="1 0 0" resolution="9 9" )"
          R"(modulus="4e5" thickness="4e-3" mu="1" ks="0"><layer poisson="0.45"/></tactile>
+<camera name="eye" pos="0.1 0.2 0.3" look="0.4 0.5 0.6" light="0.7 0.8 0.9" ambient="0.25"/>
 </sensor>
 <randomize>
 )" + lines +
@@ -145,6 +146,11 @@ const Row kNumberRows[] = {
      14},
     {R"(weld name="tie" field="turning_damping")", "loop tie turning_damping", "N m s/rad", true,
      0.13},
+    {R"(camera name="eye" pos="0")", "camera eye pos[0]", "m", false, 0.1},
+    {R"(camera name="eye" look="1")", "camera eye look[1]", "m", false, 0.5},
+    {R"(camera name="eye" light="2")", "camera eye light[2]", "1", false, 0.9},
+    {R"(camera name="eye" field="ambient")", "camera eye ambient", "1", false, 0.25},
+    {R"(camera name="eye" field="brightness")", "camera eye brightness", "1", false, 1},
 };
 
 Scene read(const std::string& lines) { return parse_scene(scene_with(lines), "s.xml").scene; }
@@ -223,7 +229,7 @@ TEST(SceneNumbers, NoKindIsForgotten) {
     if (!kind.field) continue;
     for (const auto owner :
          {NumberOwner::contact, NumberOwner::ground, NumberOwner::tactile, NumberOwner::body,
-          NumberOwner::joint, NumberOwner::motor, NumberOwner::loop}) {
+          NumberOwner::joint, NumberOwner::motor, NumberOwner::loop, NumberOwner::camera}) {
       if ((kind.elements & element_of(owner)) == 0) continue;
       const std::string of = owner_of({owner, *kind.field, ""});
       const bool indexed = kind.has(kIndexed);

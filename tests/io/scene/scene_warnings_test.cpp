@@ -108,11 +108,11 @@ TEST(SceneWarnings, PointsBesideTheFaceAreTold) {
   // Bodies pass through a part without a contact.
   EXPECT_THAT(with_part("fixed"), ElementsAre(::testing::AllOf(
                                       HasSubstr("10 of 25"), HasSubstr("a contact of 'rim', or"))));
-  const std::string of_the_finger = g.contact;
+  const std::string finger_contact = g.contact;
   g.contact +=
       "<general_primitive_contact general_body=\"object\" primitive_body=\"rim\" kn=\"100\"/>";
   EXPECT_THAT(with_part("fixed"), IsEmpty());
-  g.contact = of_the_finger;
+  g.contact = finger_contact;
   g.inside_finger =
       "<link name=\"i\"><joint name=\"i\" type=\"fixed\"/><body name=\"i\" type=\"abstract\" "
       "mass=\"1\" inertia=\"1 1 1\"/></link>";
