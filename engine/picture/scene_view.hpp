@@ -60,7 +60,7 @@ class SceneView {
   explicit SceneView(const ViewGrid& grid);
 
   /// Empties the picture. `light`: unit, to the lamp, or zero for none; `ambient`: share of light
-  /// from everywhere; `brightness`: factor of all light. A surface with normal n and the ray d, unit,
+  /// from everywhere; `brightness`: factor of all light. A surface with normal n at a unit ray d
   /// has its colour times brightness (ambient + (1 - ambient) max(0, n·light)) + emission, and
   /// white times brightness (1 - ambient) specular max(0, n·h)^exponent where n·light > 0, with h
   /// halfway between light and -d; at most white.

@@ -11,8 +11,8 @@ namespace tangere {
 
 /// Returns the numbers that <randomize> takes, but for those of the starting state: coefficients,
 /// densities, sizes, effects and places of joints, gains of position motors, poses and light of
-/// cameras. Compiling a scene in which one varies may still throw InputError, for example for the size of a body with contact
-/// points.
+/// cameras. Compiling a scene in which one varies may still throw InputError, for example for the
+/// size of a body with contact points.
 std::vector<SceneNumber> variable_numbers(const Scene& scene);
 
 /// Lets a number differ between environments. Each has the scene's value until

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Forces that limits and loops of an imported robot should hold, from which their stiffness follows.
+// Forces that limits and loops of an imported robot should hold: their stiffness follows from them.
 #pragma once
 
 #include <array>
@@ -25,8 +25,8 @@ class JointLoads {
 
   /// Of the joint of a link of the scene [N], [N m].
   [[nodiscard]] double load(std::size_t link);
-  /// The force at a point of a link, in the world, with which the joints on the way to it can load a
-  /// loop [N].
+  /// The force at a point of the world on a link with which the joints on the way to it can load
+  /// a loop [N].
   [[nodiscard]] double load_at(std::size_t link, const Vector3& point);
 
   /// Where a point of a link's body is in the world with all joints at 0.

@@ -373,6 +373,7 @@ std::vector<Violation> check_own_headers(const Tree& tree) {
       {"apps/validate.cpp", "a subcommand: apps/command.hpp"},
       {"apps/view.cpp", "a subcommand: apps/command.hpp"},
       {"engine/picture/mesh_view.cpp", "a part of scene_view.hpp"},
+      {"engine/scene/schema_elements.cpp", "a part of schema.hpp"},
       {"io/hdf5/h5_values.cpp", "a part of h5.hpp"},
       {"io/view/view_dataset.cpp", "a part of view_source.hpp"},
       {"io/view/view_trajectory.cpp", "a part of view_source.hpp"},

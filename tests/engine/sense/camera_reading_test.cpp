@@ -264,17 +264,17 @@ TEST(CameraReading, NumbersThatAreSetAreSeen) {
   EXPECT_NEAR(bright[3 * kMiddle], 2 * dark[3 * kMiddle], 1);
   const auto even = set(5, 1);  // light from everywhere
   EXPECT_EQ(even[3 * kMiddle], 255);
-  const Scene turned = [] {
-    Scene s = watched();
-    s.cameras[0].light = {0, 0, 1e-200};  // its square is 0
-    return s;
-  }();
-  EXPECT_EQ(view<std::uint8_t>(turned, FieldForm::view_rgb)[3 * kMiddle],
-            std::lround(255 * watched().cameras[0].ambient));
-  Scene blind = watched();
-  blind.randomizations.push_back({{NumberOwner::camera, NumberField::pos, "eye", 2},
-                                  {Distribution::Kind::list, 0, 0, {0}},
-                                  {}});
+  const auto drawn_as_zero = [](NumberField field, const std::vector<int>& components) {
+    Scene scene = watched();
+    for (const int k : components)
+      scene.randomizations.push_back(
+          {{NumberOwner::camera, field, "eye", k}, {Distribution::Kind::list, 0, 0, {0}}, {}});
+    return scene;
+  };
+  const Scene unlit = drawn_as_zero(NumberField::light, {0, 1, 2}),
+              blind = drawn_as_zero(NumberField::pos, {2});
+  EXPECT_EQ(view<std::uint8_t>(unlit, FieldForm::view_rgb)[3 * kMiddle],
+            std::lround(255 * unlit.cameras[0].ambient));
   EXPECT_THAT(view<std::int16_t>(blind, FieldForm::view_ids), ::testing::Each(std::int16_t{-1}));
 }
 
@@ -282,7 +282,7 @@ TEST(CameraReading, MaterialsOfBodiesAreSeen) {
   Scene scene = watched();
   scene.cameras[0].light = {0, 0, 1};
   const auto plain = view<std::uint8_t>(scene, FieldForm::view_rgb);
-  scene.links[0].body.specular = 0.5;
+  scene.links[0].body.specular = 0.5, scene.links[0].body.shininess = 0.05;
   const auto shiny = view<std::uint8_t>(scene, FieldForm::view_rgb);
   EXPECT_EQ(plain[3 * kMiddle + 1], 0);
   EXPECT_GT(shiny[3 * kMiddle + 1], 60);  // half of the lamp's 0.65, about the top
