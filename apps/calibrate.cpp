@@ -236,12 +236,12 @@ bool is_of_recording(const std::string& name) {
   return std::ranges::count(kRecordingNumbers, name) > 0;
 }
 
-/// Names the numbers of the recording that were fitted beside those of the layout: "zero, lag".
+/// How a score of the layout differs from the fit: "without zero, lag".
 std::string beside_text(const Calibration& found) {
   std::vector<std::string> names;
   for (const FittedNumber& number : found.numbers)
     if (is_of_recording(number.name) && number.name != kSliderForce) names.push_back(number.name);
-  return names.empty() ? "holding rows out" : fmt::format("{}", fmt::join(names, ", "));
+  return names.empty() ? "at all rows" : fmt::format("without {}", fmt::join(names, ", "));
 }
 
 /// Names the sensor as measured if anything of it was fitted, and adds comments. Returns whether
@@ -264,8 +264,8 @@ bool add_remarks(const Fitted& fitted, const Calibration& found, const std::stri
         fmt::join(names, ", "), file, found.normal.rows, percent(found.normal.root_mean_square));
     const std::string score = percent(written.error.root_mean_square);
     if (score != percent(found.normal.root_mean_square) || written.error.rows != found.normal.rows)
-      text += fmt::format("; scored without {}, {} rows, to {}", beside_text(found),
-                          written.error.rows, score);
+      text +=
+          fmt::format("; scored {}, {} rows, to {}", beside_text(found), written.error.rows, score);
     layout.add_comment(text);
   }
   if (slider)

@@ -133,8 +133,7 @@ std::string report_text(const CalibrationReport& report) {
   const std::size_t points = report.points;
   text += error_text(points > 0 ? "pressing forces" : "normal force", found.normal, points);
   if (percent(report.written.root_mean_square) != percent(found.normal.root_mean_square))
-    text += error_text(fmt::format("the layout scored without {}", report.beside), report.written,
-                       points);
+    text += error_text(fmt::format("the layout scored {}", report.beside), report.written, points);
   text += error_text("held out", found.normal_held_out, points);
   text += error_text("the other recording", report.other, points);
   text += error_text(points > 0 ? "forces along the skin" : "shear force", found.shear, points);

@@ -17,7 +17,7 @@ struct CalibrationReport {
   std::size_t points;      ///< of a recorded field; 0: forces
   PressError written;      ///< of the layout as it is written, as --score gives it
   PressError other;        ///< of another recording
-  std::string beside;      ///< what was fitted and is not in the layout
+  std::string beside;      ///< how the score of the layout differs from the fit
   std::vector<std::string> warnings;
   std::string output{};  ///< file that is written; "" for none
   int exit_code = 0;

@@ -12,8 +12,8 @@ namespace tangere {
 
 /// Returns what is implausible about a recording and its indenter, each with its line and value,
 /// what was expected and the likely factor: a ball that is large or tiny against the skin, depths
-/// beyond the skin or below 5 µm, speeds above 2 m/s, and a contact of few points or cells. `scene`: of
-/// placed_indenter().
+/// beyond the skin or below 5 µm, speeds above 2 m/s, and a contact of few points or cells.
+/// `scene`: of placed_indenter().
 std::vector<std::string> press_warnings(const Scene& scene, const PressRecording& recording);
 
 /// Returns what is implausible about a skin that was fitted to a recording: a stiffness that no
