@@ -27,7 +27,7 @@ PressRecording gel_path() {
 
 /// Forces of a layer with relaxation jump where a point begins to be touched at a speed.
 TEST(IntervalCoverage, IsThatOfALayerWithRelaxation) {
-  constexpr int kRecordings = 40;
+  constexpr int kRecordings = 30;
   constexpr double kNoise = 0.003;  // of the peak
   const SkinNumbers truth{{"modulus", 2e5}, {"relaxation", 0.02}, {"zero", 2.3e-5}};
   CalibrationRequest request;
