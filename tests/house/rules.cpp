@@ -316,8 +316,7 @@ std::vector<Violation> check_private_headers(const Tree& tree) {
 }
 
 std::vector<Violation> check_heavy_headers(const Tree& tree) {
-  // Each costs the compiler half a second to four seconds. Values: sources of a folder that may
-  // reach it.
+  // Each costs the compiler up to four seconds. Values: sources of a folder that may reach it.
   static const std::map<std::string, std::map<std::string, int>> allowed{
       {"CLI/", {{"apps", 1}}},
       {"Eigen/",
