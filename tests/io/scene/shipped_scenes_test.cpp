@@ -107,24 +107,15 @@ TEST(ShippedScenes, AreAllRunHere) {
   for (const auto& entry :
        std::filesystem::directory_iterator(std::string(TANGERE_SOURCE_DIR) + "/scenes"))
     if (entry.path().extension() == ".xml") found.insert(entry.path().stem().string());
-  const std::set<std::string> run = {"box_pushing",
-                                     "box_pushing_elastic",
-                                     "cap_opening",
-                                     "cap_opening_elastic",
-                                     "identify_ball",
-                                     "insertion",
-                                     "in_hand",
-                                     "mug",
-                                     "insertion_elastic",
-                                     "insertion_gel",
-                                     "rolling_ball",
-                                     "rolling_ball_small",
-                                     "stable_grasp",
-                                     "stable_grasp_elastic",
-                                     "stable_grasp_gel",
-                                     "ten_boxes",
-                                     "grip_rod",
-                                     "gel_press",
+  const std::set<std::string> run = {"box_pushing",       "box_pushing_elastic",
+                                     "cap_opening",       "cap_opening_elastic",
+                                     "identify_ball",     "insertion",
+                                     "in_hand",           "mug",
+                                     "insertion_elastic", "insertion_gel",
+                                     "rolling_ball",      "rolling_ball_small",
+                                     "stable_grasp",      "stable_grasp_elastic",
+                                     "stable_grasp_gel",  "ten_boxes",
+                                     "grip_rod",          "gel_press",
                                      "gel_grasp"};
   EXPECT_EQ(found, run) << "a scene without a test of what it does, or a test without a scene";
 }
