@@ -142,6 +142,18 @@ void warn_of_labels(const Photographs& of, const GelFit& fit, const Console& con
   }
 }
 
+/// A search that ends without a reach has made up for it by depth, as where the ball's radius is
+/// wrong.
+void warn_of_reach(const GelFit& fit, double pixel, const Console& console) {
+  constexpr double kLeast = 0.1;  // of a pixel
+  if (*fit.gel.reach >= kLeast * pixel) return;
+  console.note(
+      fmt::format("warning: the gel's reach is {:.3g} m, less than {} of a pixel, at a depth of "
+                  "{:.3g} of the imprint's radius; expected --ball to be the radius of the ball, "
+                  "not its diameter, and --pixel the side of a pixel",
+                  *fit.gel.reach, kLeast, fit.depth_ratio));
+}
+
 std::string scores_text(const Photographs& of, const GelFit& fit) {
   const PressScore mean = fit.mean();
   std::size_t worst = 0;
@@ -207,6 +219,7 @@ int run_calibrate_pictures(const PictureCalibration& a, const Console& console) 
   const Photographs photographs = read_photographs(a.folder);
   const GelFit fit = fit_gel(photographs.background, photographs.presses, *a.ball, *a.pixel);
   console.print(scores_text(photographs, fit));
+  warn_of_reach(fit, *a.pixel, console);
   warn_of_labels(photographs, fit, console);
   if (xml) {
     const PressScore mean = fit.mean();

@@ -51,8 +51,11 @@ def class_name(holder: str) -> str:
     return "SceneElements" if holder == "tangere" else holder.capitalize()
 
 
-# Attributes that come first although others may stand in their place. None leaves them out.
-LEADING = {("actuator", "motor"): ("joint",)}
+# Attributes that come first although others may stand in their place. None leaves them out, and is
+# what they are at the end of those without a name.
+LEADING = {("actuator", "motor"): ("joint",)} | {
+    ("randomize", name): ("field",) for name in ("joint", "body", "camera")
+}
 
 
 def kind_of(element: dict[str, Any]) -> str:
@@ -81,7 +84,9 @@ def method_of(element: dict[str, Any], holder: str) -> Iterator[str]:
     ]
     rest = [a for a in element["attributes"] if a not in first]
     yield from ["", f"    def {name}(", "        self,"]
-    yield from (f"        {a['name']}: {type_of(a)}," for a in first)
+    for place, a in enumerate(first):
+        free = not any(is_needed(later) for later in first[place:])
+        yield f"        {a['name']}: {optional(type_of(a)) + ' = None' if free else type_of(a)},"
     if rest:
         yield "        *,"
     yield from (f"        {a['name']}: {optional(type_of(a))} = None," for a in rest)

@@ -21,9 +21,10 @@ namespace {
 
 constexpr double kDegree = 3.14159265358979323846 / 180;
 constexpr float kBrightest = 255;
-constexpr std::uint32_t kSky = 200U | (216U << 8) | (235U << 16);
+constexpr std::array<float, 3> kSky{200, 216, 235};
 constexpr float kSmallest = 1e-20F;  // in place of a direction's number that is zero
 constexpr float kNowhere = 1e30F;    // depth of a ray that meets nothing [m]
+constexpr std::size_t kBits = 8;     // of exponents
 constexpr float kDarker = 0.2F;      // of the tone of every other square
 
 /// Rays of a row of pixels in the axes of a solid.
@@ -40,11 +41,10 @@ struct RayRow {
   float square, pixel;  // sides of squares [m], and of a pixel at depth 1 m
   float far;
   std::int32_t number;
-  // Of solids with a highlight or an emission.
-  std::array<float, 3> unit;  // lengths along axes of the solid by those of o and d
-  float specular, emission;
-  int exponent;
-  bool bright;  // whether it has one, or its colours may be above white
+  // Of solids with a highlight.
+  std::array<float, 3> unit;               // lengths along axes of the solid by those of o and d
+  float specular;                          // 0: none
+  std::array<float, kBits> exponent_bits;  // each 0 or 1, the lowest first
 };
 
 struct Ray {
@@ -153,29 +153,22 @@ struct Hit {
   return 1.0F - darker * (0.5F + (odd - 0.5F) * contrast);
 }
 
-/// The colour's numbers times a tone, rounded.
-[[gnu::always_inline]] inline std::uint32_t packed(const std::array<float, 3>& colour, float tone) {
-  const auto byte = [tone](float level) {
-    return static_cast<std::uint32_t>(static_cast<std::int32_t>(level * tone + 0.5F));
-  };
-  return byte(colour[0]) | (byte(colour[1]) << 8) | (byte(colour[2]) << 16);
-}
-
-/// x to the power of 1 to 128, of x from 0 to 1. What is too small to be seen is zero, because
-/// numbers without a leading one are slow.
-[[gnu::always_inline]] inline float power(float x, int exponent) {
+/// x to the power of 1 to 255, of x from 0 to 1, by the exponent's bits. Factors of bits that are
+/// not set are 1 by arithmetic, because compilers make no vectors of branches. What is too small to
+/// be seen is zero, because numbers without a leading one are slow.
+[[gnu::always_inline]] inline float power(float x, const std::array<float, kBits>& bits) {
   constexpr float kUnseen = 1e-18F;
   float product = 1;
-  for (int bit = 0; bit < 8; ++bit) {
-    const float with = product * x;
-    product = (exponent >> bit & 1) != 0 ? (with > kUnseen ? with : 0.0F) : product;
+  for (const float bit : bits) {
+    const float with = product * (bit * x + (1.0F - bit));
+    product = with > kUnseen ? with : 0.0F;
     x = x * x > kUnseen ? x * x : 0.0F;
   }
   return product;
 }
 
-/// The strength of the highlight at a surface, 0 to 1. Of a ray with directions dx, dy, dz in the
-/// solid's axes, of any length.
+/// The strength of the highlight at a surface that the light reaches, 0 to 1. Of a ray with
+/// directions dx, dy, dz in the solid's axes, of any length.
 [[gnu::always_inline]] inline float highlight(const Hit& hit, float dx, float dy, float dz,
                                               const RayRow& row) {
   const float length = std::sqrt(dx * dx + (dy * dy + dz * dz));
@@ -183,13 +176,12 @@ struct Hit {
               ahead = (row.light[0] * dx + (row.light[1] * dy + row.light[2] * dz)) / length;
   const float square = 2.0F - 2.0F * ahead,
               half = (hit.cosine - across) / std::sqrt(square > kSmallest ? square : kSmallest);
-  const float cosine = half > 0 ? (half < 1 ? half : 1.0F) : 0.0F;
-  return hit.cosine > 0 ? power(cosine, row.exponent) : 0.0F;
+  return power(half > 0 ? (half < 1 ? half : 1.0F) : 0.0F, row.exponent_bits);
 }
 
 /// The colour's numbers times a tone, and white, rounded; at most white.
-[[gnu::always_inline]] inline std::uint32_t packed_below_white(const std::array<float, 3>& colour,
-                                                               float tone, float white) {
+[[gnu::always_inline]] inline std::uint32_t packed(const std::array<float, 3>& colour, float tone,
+                                                   float white) {
   const auto byte = [tone, white](float level) {
     const float lit = level * tone + white;
     return static_cast<std::uint32_t>(
@@ -227,16 +219,12 @@ template <Hit (*Law)(const Ray&, const RayRow&), bool kMatte>
     const float t = row.middle + hit.s;
     const float lit = hit.cosine > 0 ? (hit.cosine < 1 ? hit.cosine : 1.0F) : 0.0F;
     const float tone = row.ambient + row.direct * lit;
-    std::uint32_t colour = 0;
-    if constexpr (kMatte)
-      colour = packed(row.colour, tone);
-    else
-      colour = packed_below_white(
-          row.colour, tone + row.emission,
-          row.specular * highlight(hit, ray.dx * row.unit[0], ray.dy * row.unit[1],
-                                   ray.dz * row.unit[2], row));
-    put(t > static_cast<float>(kNearest) ? t : kNowhere, row.number, colour, depth[j], numbers[j],
-        colours[j]);
+    float white = 0;
+    if constexpr (!kMatte)
+      white = row.specular *
+              highlight(hit, ray.dx * row.unit[0], ray.dy * row.unit[1], ray.dz * row.unit[2], row);
+    put(t > static_cast<float>(kNearest) ? t : kNowhere, row.number,
+        packed(row.colour, tone, white), depth[j], numbers[j], colours[j]);
   }
 }
 
@@ -250,7 +238,8 @@ template <bool kMatte>
   std::uint32_t* const colours = row.colours;
   const float lit = row.light[2] > 0 ? row.light[2] : 0.0F, tone = row.ambient + row.direct * lit,
               per_square = row.square > 0 ? 1.0F / row.square : 0.0F,
-              footprint = row.pixel * per_square, darker = row.square > 0 ? kDarker : 0.0F;
+              footprint = row.pixel * per_square, darker = row.square > 0 ? kDarker : 0.0F,
+              specular = row.light[2] > 0 ? row.specular : 0.0F;
 #pragma GCC ivdep
   for (int j = row.first; j < row.end; ++j) {
     const float dz = row.d[2] + row.x[2] * u[j], t = -row.o[2] / dz;
@@ -260,15 +249,12 @@ template <bool kMatte>
                 y = (row.o[1] + near * (row.d[1] + row.x[1] * u[j])) * per_square;
     const float across = near * footprint / (seen ? -dz : 1.0F);
     const float tone_here = tone * tone_of_square(x, y, across, darker);
-    std::uint32_t colour = 0;
-    if constexpr (kMatte)
-      colour = packed(row.colour, tone_here);
-    else
-      colour = packed_below_white(
-          row.colour, tone_here + row.emission,
-          row.specular * highlight({t, row.light[2], 0, 0, 1}, row.d[0] + row.x[0] * u[j],
-                                   row.d[1] + row.x[1] * u[j], dz, row));
-    put(seen ? t : kNowhere, row.number, colour, depth[j], numbers[j], colours[j]);
+    float white = 0;
+    if constexpr (!kMatte)
+      white = specular * highlight({t, row.light[2], 0, 0, 1}, row.d[0] + row.x[0] * u[j],
+                                   row.d[1] + row.x[1] * u[j], dz, row);
+    put(seen ? t : kNowhere, row.number, packed(row.colour, tone_here, white), depth[j], numbers[j],
+        colours[j]);
   }
 }
 
@@ -278,25 +264,23 @@ TANGERE_CLONES void cast_cuboid(const RayRow& row) { cast_row<cuboid_hit, true>(
 TANGERE_CLONES void cast_cylinder(const RayRow& row) { cast_row<cylinder_hit, true>(row); }
 TANGERE_CLONES void cast_capsule(const RayRow& row) { cast_row<capsule_hit, true>(row); }
 TANGERE_CLONES void cast_half_space(const RayRow& row) { cast_half_space_row<true>(row); }
-TANGERE_CLONES void cast_bright_ball(const RayRow& row) { cast_row<ball_hit, false>(row); }
-TANGERE_CLONES void cast_bright_ellipsoid(const RayRow& row) {
-  cast_row<ellipsoid_hit, false>(row);
-}
-TANGERE_CLONES void cast_bright_cuboid(const RayRow& row) { cast_row<cuboid_hit, false>(row); }
-TANGERE_CLONES void cast_bright_cylinder(const RayRow& row) { cast_row<cylinder_hit, false>(row); }
-TANGERE_CLONES void cast_bright_capsule(const RayRow& row) { cast_row<capsule_hit, false>(row); }
-TANGERE_CLONES void cast_bright_half_space(const RayRow& row) { cast_half_space_row<false>(row); }
+TANGERE_CLONES void cast_shiny_ball(const RayRow& row) { cast_row<ball_hit, false>(row); }
+TANGERE_CLONES void cast_shiny_ellipsoid(const RayRow& row) { cast_row<ellipsoid_hit, false>(row); }
+TANGERE_CLONES void cast_shiny_cuboid(const RayRow& row) { cast_row<cuboid_hit, false>(row); }
+TANGERE_CLONES void cast_shiny_cylinder(const RayRow& row) { cast_row<cylinder_hit, false>(row); }
+TANGERE_CLONES void cast_shiny_capsule(const RayRow& row) { cast_row<capsule_hit, false>(row); }
+TANGERE_CLONES void cast_shiny_half_space(const RayRow& row) { cast_half_space_row<false>(row); }
 
-/// How rows of a kind of solid are drawn, by whether a colour may be above white.
+/// How rows of a kind of solid are drawn, by whether it has a highlight.
 using CastRow = void (*)(const RayRow&);
-CastRow cast_of(SolidKind kind, bool bright) {
+CastRow cast_of(SolidKind kind, bool shiny) {
   switch (kind) {
-    case SolidKind::ball: return bright ? cast_bright_ball : cast_ball;
-    case SolidKind::ellipsoid: return bright ? cast_bright_ellipsoid : cast_ellipsoid;
-    case SolidKind::cuboid: return bright ? cast_bright_cuboid : cast_cuboid;
-    case SolidKind::cylinder: return bright ? cast_bright_cylinder : cast_cylinder;
-    case SolidKind::capsule: return bright ? cast_bright_capsule : cast_capsule;
-    case SolidKind::half_space: return bright ? cast_bright_half_space : cast_half_space;
+    case SolidKind::ball: return shiny ? cast_shiny_ball : cast_ball;
+    case SolidKind::ellipsoid: return shiny ? cast_shiny_ellipsoid : cast_ellipsoid;
+    case SolidKind::cuboid: return shiny ? cast_shiny_cuboid : cast_cuboid;
+    case SolidKind::cylinder: return shiny ? cast_shiny_cylinder : cast_cylinder;
+    case SolidKind::capsule: return shiny ? cast_shiny_capsule : cast_capsule;
+    case SolidKind::half_space: return shiny ? cast_shiny_half_space : cast_half_space;
   }
   return nullptr;
 }
@@ -314,11 +298,11 @@ RayRow rows_of(const ViewSolid& solid, const Vector3& light, double ambient, dou
   RayRow row{};
   row.middle = single(plane ? 0 : solid.origin[2]);
   row.side = single(plane ? 0 : solid.origin[0]);
-  row.ambient = single(ambient), row.direct = single(direct);
+  row.ambient = single(ambient + std::clamp(solid.emission, 0.0, 1.0)), row.direct = single(direct);
   row.specular = kBrightest * single(direct * std::clamp(solid.specular, 0.0, 1.0));
-  row.exponent = std::clamp(solid.exponent, 1, kLargestExponent);
-  row.emission = single(std::clamp(solid.emission, 0.0, 1.0));
-  row.bright = row.specular > 0 || row.emission > 0 || ambient + direct > 1 + 1e-9;
+  const int exponent = std::clamp(solid.exponent, 1, kLargestExponent);
+  for (std::size_t k = 0; k < kBits; ++k)
+    row.exponent_bits[k] = static_cast<float>(exponent >> k & 1);
   row.square = single(solid.square), row.pixel = single(1 / focal);
   row.far = single(far);
   row.number = solid.number;
@@ -365,7 +349,7 @@ void SceneView::begin(const Vector3& light, double ambient, double brightness) {
   light_ = light, ambient_ = ambient * brightness, direct_ = (1 - ambient) * brightness;
   std::fill(depth_.begin(), depth_.end(), static_cast<float>(grid_.far));
   std::fill(numbers_.begin(), numbers_.end(), kNoSolid);
-  std::fill(colours_.begin(), colours_.end(), kSky);
+  std::fill(colours_.begin(), colours_.end(), packed(kSky, static_cast<float>(brightness), 0));
 }
 
 SceneView::Pixels SceneView::pixels_of(std::span<const Vector3> centres, double radius) const {
@@ -423,7 +407,7 @@ void SceneView::add(const ViewSolid& solid) {
   const Pixels pixels = pixels_of(solid);
   const bool plane = solid.kind == SolidKind::half_space;
   RayRow row = rows_of(solid, light_, ambient_, direct_, focal_, grid_.far);
-  const CastRow cast_row = cast_of(solid.kind, row.bright);
+  const CastRow cast_row = cast_of(solid.kind, row.specular > 0);
   if (plane && !(dot(solid.axes[2], solid.origin) < 0)) return;  // the pinhole is inside
   row.u = u_.data();
   row.first = pixels.first_col, row.end = pixels.end_col;

@@ -74,6 +74,10 @@ inline constexpr std::uint64_t kContacts = kGroundContact | kPairContact,
                                kVarying = kVaryJoint | kVaryMotor | kVaryGround | kVaryPair |
                                           kVaryTactile | kVaryBody | kVarySurface | kVaryConnect |
                                           kVaryWeld | kVaryCamera;
+
+/// Elements of which also a number of a vector may vary, by its index.
+inline constexpr std::uint64_t kVaryIndexed = kVaryJoint | kVaryBody | kVaryCamera;
+
 /// The name in scene files.
 const char* to_string(Element element);
 

@@ -51,6 +51,7 @@ struct Readout::Impl {
   std::vector<std::optional<ChannelReading>> channels;  // (sensors) of those that have them
   // (sensors) of those of which a picture was read.
   std::vector<std::optional<PictureReading<float>>> pictures;
+  std::vector<std::optional<PictureReading<double>>> pictures_f64;
   std::vector<std::optional<CameraReading>> cameras;  // those of which a picture was read
   std::vector<float> picture;                         // of one environment, before conversion
   std::vector<double> displacement, elastic_field;    // (points, 3)
@@ -88,6 +89,7 @@ struct Readout::Impl {
       if (small(s)) grow(block_readings, 3 * kBlock * points);
     }
     pictures.resize(compiled(m).sensors.size());
+    pictures_f64.resize(pictures.size());
     cameras.resize(compiled(m).cameras.size());
     if (compiled(m).layout.past_states > 0) {
       earlier.resize(block_readings.size());
@@ -311,11 +313,26 @@ struct Readout::Impl {
     std::transform(values.begin(), values.end(), to, [](double x) { return static_cast<T>(x); });
   }
 
-  /// Writes a picture, after find_touches(). T: double, float or a byte.
+  /// Writes a picture, after find_touches(). T: double, float or a byte. Doubles are computed in
+  /// double, which gradients take, unless the readout is mixed.
   template <class T>
   void write_picture(const Batch& batch, int environment, FieldOutput of, T* to) {
+    const std::size_t numbers = numbers_of(model.sensors()[std::size_t(of.sensor)], of.form);
+    if constexpr (std::is_same_v<T, double>) {
+      if (precision == Precision::f64)
+        return read_picture(pictures_f64, batch, environment, of, std::span(to, numbers));
+      picture.resize(numbers);
+      read_picture(pictures, batch, environment, of, std::span(picture));
+      std::copy(picture.begin(), picture.end(), to);
+    } else {
+      read_picture(pictures, batch, environment, of, std::span(to, numbers));
+    }
+  }
+  template <class Real, class T>
+  void read_picture(std::vector<std::optional<PictureReading<Real>>>& readings, const Batch& batch,
+                    int environment, FieldOutput of, std::span<T> to) {
     check_has(of);
-    std::optional<PictureReading<float>>& reading = pictures[std::size_t(of.sensor)];
+    std::optional<PictureReading<Real>>& reading = readings[std::size_t(of.sensor)];
     if (!reading) reading.emplace(model, of.sensor);
     if (reading->needs_depth())
       reading->set_touches(
@@ -323,14 +340,7 @@ struct Readout::Impl {
     if (reading->needs_field(of.form))
       reading->set_field(of.form, read_ideal_field(batch, environment, of.sensor));
     reading->set_draws(key_of(batch, environment));
-    const std::size_t numbers = numbers_of(model.sensors()[std::size_t(of.sensor)], of.form);
-    if constexpr (std::is_same_v<T, double>) {
-      picture.resize(numbers);
-      reading->read(of.form, std::span(picture));
-      std::copy(picture.begin(), picture.end(), to);
-    } else {
-      reading->read(of.form, std::span<T>(to, numbers));
-    }
+    reading->read(of.form, to);
   }
 
   /// Writes a reading of an imperfect sensor whose touches were found.

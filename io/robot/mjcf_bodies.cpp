@@ -426,7 +426,11 @@ class Bodies {
     if (node.has("material")) {
       const auto& materials = part.file().materials;
       const auto material = materials.find(node.text("material"));
-      if (material != materials.end()) piece.looks = material->second;
+      if (material != materials.end())
+        piece.looks = material->second;
+      else
+        node.changed("<geom> of material '" + node.text("material") +
+                     "': the usual grey, because no <material> has that name");
     }
     if (!node.has("rgba")) return;
     const std::vector<double> x = node.numbers("rgba", 4);

@@ -177,7 +177,11 @@ void read_material(MjcfFile& file, const RobotNode& node) {
     looks.rgba = {x[0], x[1], x[2], x[3]};
   }
   const auto share = [&](const char* name, double usual) {
-    return std::clamp(node.number(name, usual), 0.0, 1.0);
+    const double given = node.number(name, usual), kept = std::clamp(given, 0.0, 1.0);
+    if (kept != given)
+      node.changed(fmt::format("<material> {}=\"{:g}\": {:g}, because it is from 0 to 1", name,
+                               given, kept));
+    return kept;
   };
   if (node.has("specular") || node.has("shininess")) {
     looks.specular = share("specular", kUsual);

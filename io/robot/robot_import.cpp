@@ -307,6 +307,13 @@ ImportedScene import_robot(const fs::path& path, const fs::path& output,
     sections.defaults =
         "    <!-- a guess, per area: set them for your materials -->\n"
         "    <surface_contact kn=\"1e8\" kt=\"1e6\" mu=\"1\" damping=\"1e8\"/>\n";
+  // Skins feel what the file excludes where a contact is requested.
+  std::erase_if(robot.excluded, [&](const auto& pair) {
+    return std::ranges::any_of(options.touches, [&](const TouchRequest& t) {
+      return (t.first == pair[0] && t.second == pair[1]) ||
+             (t.first == pair[1] && t.second == pair[0]);
+    });
+  });
   sections.sensors = pads_text(robot, options.pads, name);
   sections.places = end_effectors_text(robot, options.end_effectors, name);
   list_sites(robot, options);

@@ -94,9 +94,19 @@ class SensorWarnings {
     return first ? c.primitive_body : c.general_body;
   }
 
+  /// Whether the sensor's body touches the ground by its points or by its surface. The ground is no
+  /// link.
   [[nodiscard]] bool on_the_ground() const {
     return std::any_of(scene_.ground_contacts.begin(), scene_.ground_contacts.end(),
-                       [&](const auto& c) { return c.body == sensor_.body; });
+                       [&](const auto& c) { return c.body == sensor_.body; }) ||
+           std::any_of(scene_.pair_contacts.begin(), scene_.pair_contacts.end(),
+                       [&](const auto& c) {
+                         const std::string other = other_of(c);
+                         return !other.empty() && !is_link(other);
+                       });
+  }
+  [[nodiscard]] bool is_link(const std::string& body) const {
+    return std::ranges::any_of(scene_.links, [&](const auto& l) { return l.body.name == body; });
   }
   [[nodiscard]] std::string ground_hint() const {
     return on_the_ground() ? ". No sensor feels the ground; expected a body of type plane in its "
@@ -108,7 +118,7 @@ class SensorWarnings {
     std::set<std::string> unsensed;
     for (const PairContactDescription& c : scene_.pair_contacts) {
       const std::string other = other_of(c);
-      if (!other.empty() && !sensed_groups_.contains(group_of(other)) && !has_a_distance(other))
+      if (is_link(other) && !sensed_groups_.contains(group_of(other)) && !has_a_distance(other))
         unsensed.insert(other);
     }
     if (unsensed.empty()) return;

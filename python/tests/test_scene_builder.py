@@ -231,6 +231,21 @@ def test_elements_are_found_by_the_names_that_they_have_without_one():
         b.find("motor", name="left")
 
 
+def test_numbers_of_vectors_vary_by_their_index():
+    b = gripper()
+    b.sensor.camera("eye", pos=(0, -0.3, 0.2), look=(0, 0, 0))
+    b.randomize.camera("eye", pos=2, uniform=(0.15, 0.25))
+    b.randomize.camera("eye", field="ambient", uniform=(0.2, 0.4))
+    b.randomize.joint("left", q=0, uniform=(0, 0.001))
+    b.randomize.body("hand", size=2, uniform=(0.05, 0.06))
+    drawn = tangere.Batch(tangere.Model(b.scene()), num_envs=2, seed=3).randomized
+    drawn = drawn() if callable(drawn) else drawn
+    expected = ["camera eye pos[2]", "camera eye ambient", "joint left q[0]", "body hand size[2]"]
+    assert [*drawn] == expected
+    no_index = lambda b: b.randomize.camera("eye", uniform=(0, 1))  # noqa: E731
+    assert "expected" in fault(no_index)
+
+
 def test_one_of_several_elements_is_not_found_by_chance():
     b = gripper()
     size = "0.02 0.01 0.02"

@@ -448,6 +448,10 @@ TEST_F(RobotKinds, GeomsThatTouchNothingHaveAMassAlone) {
     felt.push_back(scene.links[std::size_t(k)].body.name);
   EXPECT_THAT(felt, ElementsAre("finger")) << "the palm is a neighbour";
   EXPECT_NEAR(Model(scene).mass(6), 8 * 3000 * 1e-6, 1e-12) << "a picture has a mass";
+  options.touches = {{"thumb", "tip"}};
+  EXPECT_THAT(import_robot(folder_ / "robot.xml", folder_ / "scene.xml", options).text,
+              HasSubstr("ignores=\"cover,finger_shape\""))
+      << "a requested contact is felt";
   const auto touched = [&](const std::string& link) {
     options.touches = {{"tip", link}};
     return parse_scene(import_robot(folder_ / "robot.xml", folder_ / "scene.xml", options).text,

@@ -69,6 +69,24 @@ TEST(SceneWarnings, TheGroundIsNotFelt) {
                                                          HasSubstr("No sensor feels the ground"))));
 }
 
+/// The world has the ground and the thumb, which does not move and is felt.
+TEST(SceneWarnings, TheGroundIsNotFeltWhereSurfacesTouchIt) {
+  const auto text = [](const char* below) {
+    return std::string(R"(<tangere><option unit="m-kg"/><ground/><robot>
+      <link name="base"><joint name="base" type="fixed"/>
+        <body name="base" type="cuboid" pos="0 0 0.2" size="0.02 0.02 0.02"/>
+        <link name="finger"><joint name="finger" type="prismatic" axis="0 0 1"/>
+          <body name="finger" type="cuboid" size="0.02 0.02 0.02" density="500"/></link></link>
+      </robot><contact><surface_contact body1="finger" body2="ground" kn="1e8" kt="1e6" mu="1"
+      damping="1e8"/></contact><sensor><tactile name="skin" body="finger" type="rect_array"
+      rect_pos0="-0.008 -0.008 -0.01" rect_pos1="0.008 0.008 -0.01" axis0="1 0 0" axis1="0 -1 0"
+      resolution="5 5" kn="1280" feels=")") +
+           below + R"("/></sensor></tangere>)";
+  };
+  EXPECT_THAT(parse_scene(text("base"), "s.xml").warnings,
+              ElementsAre(HasSubstr("does not feel the ground, which touches")));
+}
+
 TEST(SceneWarnings, PointsBelowOrOffTheSurfaceAreTold) {
   Grasp g;
   g.corner0 = "-0.005 -0.005 0.006";
