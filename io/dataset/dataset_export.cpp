@@ -68,7 +68,8 @@ std::vector<std::string> units_of(const std::string& text, std::size_t width) {
     }
     if (parts.size() == width && (width > 2 || between.size() > 1)) return parts;
     if (between.size() > 1 && parts.size() > 1 && width % parts.size() == 0) {
-      for (std::size_t k = parts.size(); k < width; ++k) parts.push_back(parts[k % parts.size()]);
+      const std::size_t each = parts.size();  // such as a body, in turn
+      for (std::size_t k = each; k < width; ++k) parts.push_back(parts[k - each]);
       return parts;
     }
   }

@@ -9,6 +9,8 @@ import subprocess
 
 import pytest
 
+import tangere
+
 pytest.importorskip("pyarrow", reason="pyarrow is not installed")
 pytest.importorskip("zarr", reason="zarr is not installed")
 pytest.importorskip("PIL.Image", reason="pillow is not installed")
@@ -120,3 +122,14 @@ def test_what_is_no_export_of_tangere_is_told(sets, info, tmp_path):
     assert "has no shards" in info(tmp_path / "empty")[1]["error"]
     (tmp_path / "other.csv").write_text("a,b\n1,2\n")
     assert info(tmp_path / "other.csv")[0] == 3
+
+
+def test_a_table_has_the_unit_of_every_number_of_a_body(generate, command, info, tmp_path):
+    data = generate(str(tangere.scenes()["mug"]), "--episodes", "1", "--steps", "10", "--every",
+                    "5", "--record", "bodies")  # fmt: skip
+    table = tmp_path / "out.csv"
+    subprocess.run([command, "export", data, table, "--to", "csv", "--quiet"], check=True)
+    arrays = {array["name"]: array["unit"] for array in info(table)[1]["arrays"]}
+    units = [unit for name, unit in arrays.items() if name.startswith("bodies/")]
+    assert len(units) > 13 and len(set(units[:13])) > 2
+    assert units == units[:13] * (len(units) // 13)
