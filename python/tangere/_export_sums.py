@@ -7,7 +7,8 @@ short, and `tangere validate` those whose bytes have changed.
 
 The file that says where the data come from has it as `stored`, four lists of one length: `paths`,
 `files` (in a path; 1 of a file), `bytes`, `sums`. Of Zarr a path is the folder of an array, whose
-chunks of zeros have no file. Text that people edit is left out: README.md, info.json, attributes.
+chunks of zeros have no file, and its `.zarray`, by which they are read, is a path of its own. Text
+that people edit is left out: README.md, info.json, attributes.
 """
 
 from __future__ import annotations
@@ -22,13 +23,14 @@ _BLOCK = 1 << 20
 
 
 def sums_of(folder: Path, names: Iterable[str], by_folder: bool) -> Sums:
-    """Of files below `folder`; those that are not there are left out. `by_folder`: as folders."""
+    """Of files below `folder`; those that are not there are left out. `by_folder`: as folders, but
+    for files whose names begin with a dot."""
     found: Sums = {}
     for name in names:
         path = folder / name
         if not path.is_file():
             continue
-        key = str(Path(name).parent) if by_folder else name
+        key = str(path.parent.relative_to(folder)) if by_folder and path.name[0] != "." else name
         found = joined([found, {key: (1, path.stat().st_size, _sum(path))}])
     return found
 

@@ -37,7 +37,7 @@ class ZarrStore:
     """What formats in Zarr share. They add `columns` and `arrays`."""
 
     kind, sign, origin = "Zarr data set", ".zgroup", ".zattrs"
-    by_folder, common = True, ["meta/episode_ends/0"]
+    by_folder = True
     fps: int
 
     def __init__(
@@ -45,6 +45,8 @@ class ZarrStore:
     ):
         self.frames, self.columns, self._said = frames, columns, said or {}
         self.names = list(columns)
+        arrays = [*(f"data/{name}" for name in columns), "meta/episode_ends"]
+        self.common = ["meta/episode_ends/0", *(f"{name}/.zarray" for name in arrays)]
         self.fps = max(1, round(1 / frames.seconds))
         sizes = [_bytes_of(column) for column in columns.values()]
         part = _power_below(_PART_BYTES // max(1, sum(sizes)))

@@ -316,6 +316,18 @@ def test_a_file_that_is_not_of_the_export_is_found(sets, command, tmp_path, to, 
     assert run.returncode == 3 and f"'{copy / name}' is not a file of this export" in run.stderr
 
 
+@pytest.mark.parametrize("to, name", [
+    ("zarr", "data/tactile"), ("zarr", "meta/episode_ends"), ("ftp1", "data/action"),
+])  # fmt: skip
+def test_a_changed_description_of_an_array_is_found(sets, command, tmp_path, to, name):
+    copy = tmp_path / "out"
+    shutil.copytree(sets[to], copy)
+    about = copy / name / ".zarray"
+    edit('"order": "C"', '"order": "F"')(about)
+    run = subprocess.run([command, "validate", copy], capture_output=True, text=True)
+    assert run.returncode == 3 and f"'{about}' is damaged: the checksum of its" in run.stderr
+
+
 def test_an_export_of_an_older_version_has_no_sums(sets, command, tmp_path):
     shutil.copytree(sets["zarr"], tmp_path / "out")
     notes = tmp_path / "out/.zattrs"
