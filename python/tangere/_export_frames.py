@@ -267,17 +267,35 @@ def unit_and_meaning(episodes: Episodes, key: str) -> tuple[str, str]:
 
 
 def action_units(episodes: Episodes) -> list[str]:
-    """Of the numbers of an action. Data sets of older versions have one unit, of tasks alone."""
+    """Of the numbers of an action. Data sets of older versions have one unit, of tasks alone, and
+    of scenes none: then each is empty, not known."""
     said = episodes.attributes
     if "action_units" in said:
         return [str(unit) for unit in said["action_units"]]
-    return [str(said.get("action_unit", "1"))] * len(said["action_names"])
+    return [str(said.get("action_unit", ""))] * len(said["action_names"])
 
 
 def action_unit(episodes: Episodes) -> str:
     """In one text: "m", or "m, rad, 1" of numbers that differ."""
-    units = action_units(episodes)
+    return unit_text(action_units(episodes))
+
+
+def unit_text(units: Sequence[str]) -> str:
+    """Of numbers: "m", or "m, rad, 1" of those that differ; empty if one is not known."""
+    if not all(units):
+        return ""
     return ", ".join(units if len(set(units)) > 1 else units[:1])
+
+
+def number_units(
+    episodes: Episodes, key: str, width: int, places: Sequence[int] = ()
+) -> list[str]:
+    """Of each number of an observation, or of those `places` of q or v; empty if not known."""
+    unit = unit_and_meaning(episodes, key)[0]
+    if not unit and key in ("q", "v"):
+        units = [str(unit) for unit in episodes.attributes.get(f"{key}_units", ())]
+        return [units[k] for k in places] if units and places else units or [""] * width
+    return [unit] * (len(places) or width)
 
 
 def names_of(episodes: Episodes, key: str, places: Sequence[int]) -> list[str]:

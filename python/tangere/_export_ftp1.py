@@ -28,7 +28,7 @@ from typing import Any
 import numpy as np
 
 from . import _core
-from ._export_frames import Arrays, Frames, is_picture, picture_rows
+from ._export_frames import Arrays, Frames, is_picture, number_units, picture_rows, unit_text
 from ._export_zarr import Column, ZarrStore, attributes_of
 from ._lerobot_format import task_text
 
@@ -91,8 +91,9 @@ class Ftp1(ZarrStore):
         shape = (len(self._hand),)
         if self._hand:
             columns[self._hand_key] = Column(
-                shape, np.dtype(np.float32), {"names": [*self._slots]}
-            )
+                shape, np.dtype(np.float32),
+                {"names": [*self._slots]} | _unit(frames, self._hand),
+            )  # fmt: skip
             columns[f"{self._hand_key}_idx"] = Column(shape, np.dtype(np.int32), {})
         self.notes = [] if self._hand else [
             "FTP-1's loader reads the touch of a hand with joints alone; see --hand"
@@ -105,7 +106,7 @@ class Ftp1(ZarrStore):
         if self._joints:
             names = {"names": joints.split(",") if joints else []}
             columns[f"{side}_arm_joints"] = Column(
-                (len(self._joints),), np.dtype(np.float32), names
+                (len(self._joints),), np.dtype(np.float32), names | _unit(frames, self._joints)
             )
         self._arm = f"{side}_arm_joints"
         self._camera = camera
@@ -164,6 +165,11 @@ class Ftp1(ZarrStore):
         if self._camera:
             found["camera_main_rgb"] = picture_rows(frames, self._camera)
         return found
+
+
+def _unit(frames: Frames, places: list[int]) -> dict[str, str]:
+    """Of coordinates, as an array says it."""
+    return {"unit": unit_text(number_units(frames.episodes, "q", 1, places))}
 
 
 def _kind(picture: bool, shape: tuple[int, ...]) -> str:

@@ -32,7 +32,7 @@ from PIL import Image
 
 from . import _core
 from ._export_frames import (
-    Arrays, Frames, action_unit, is_picture, picture_rows, unit_and_meaning
+    Arrays, Frames, action_unit, is_picture, number_units, picture_rows, unit_and_meaning, unit_text
 )  # fmt: skip
 from ._export_ftp1 import joint_places
 from ._export_job import sync, write_json
@@ -148,6 +148,9 @@ class UniVtac:
         units = {"press_depth": "mm", "marker": "pixels"}
         if name == "action":
             return action_unit(self.frames.episodes)
+        if name in ("q", "embodiment/joint"):
+            places = [] if name == "q" else self._joints
+            return unit_text(number_units(self.frames.episodes, "q", 1, places))
         owner, _, reading = name.removeprefix("tactile/").partition("/")
         if reading == "force":
             return unit_and_meaning(self.frames.episodes, owner)[0]

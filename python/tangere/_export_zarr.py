@@ -18,7 +18,7 @@ import numpy as np
 import zarr
 
 from . import _core
-from ._export_frames import Arrays, Frames, action_unit, action_units, unit_and_meaning
+from ._export_frames import Arrays, Frames, action_unit, action_units, unit_and_meaning, unit_text
 
 _CHUNK_BYTES = 1 << 20  # of a chunk, at most, where a row is smaller
 _PART_BYTES = 1 << 26  # of the numbers of a part
@@ -174,7 +174,7 @@ class Zarr(ZarrStore):
         if name not in self._numbers:
             return about
         lists = {what: [about[what][k] for k in self._numbers[name]] for what in ("names", "units")}
-        return about | lists
+        return about | lists | {"unit": unit_text(lists["units"])}
 
     def arrays(self, frames: Arrays, start: int) -> Arrays:
         found = {name: frames[source] for name, source in self._sources.items()}
@@ -191,6 +191,7 @@ def attributes_of(frames: Frames) -> dict[str, dict[str, Any]]:
         if key in ("q", "v"):
             for what in ("names", "units"):
                 said[key][what] = [str(x) for x in episodes.attributes[f"{key}_{what}"]]
+            said[key].setdefault("unit", unit_text(said[key]["units"]))
     for key, window in frames.windows.items():
         said[key]["window"] = window
     said["action"] = {

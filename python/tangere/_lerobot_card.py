@@ -6,7 +6,9 @@ from __future__ import annotations
 import json
 from typing import Any, Sequence
 
-from ._export_frames import Frames, action_unit, hidden_in_words, names_of, unit_and_meaning
+from ._export_frames import (
+    Frames, action_unit, hidden_in_words, names_of, number_units, unit_and_meaning, unit_text
+)  # fmt: skip
 from ._lerobot_features import STATE, Feature
 from .data import Episodes
 
@@ -77,8 +79,9 @@ def _pictures(features: Sequence[Feature]) -> str:
 
 def _columns(episodes: Episodes, features: Sequence[Feature]) -> list[str]:
     said = episodes.attributes
+    unit = f" [{action_unit(episodes)}]" if action_unit(episodes) else ""
     about = {
-        "action": f"{said.get('action_meaning', 'controls')} [{action_unit(episodes)}]",
+        "action": f"{said.get('action_meaning', 'controls')}{unit}",
         "next.reward": "reward of the action",
         "next.done": "true in the last frame of an episode",
         "next.success": "true in the last frame of an episode that ended in success",
@@ -103,6 +106,8 @@ def _columns(episodes: Episodes, features: Sequence[Feature]) -> list[str]:
                 names = names_of(episodes, key, feature.numbers[key])
                 what += f" of joints {moved}: {', '.join(names)}"
             unit, meaning = unit_and_meaning(episodes, key)
+            if key in ("q", "v"):
+                unit = unit_text(number_units(episodes, key, 1, feature.numbers.get(key, ())))
             what += f" [{unit}]" if unit else ""
             lines.append(f"  - {what}" + (f": {meaning}" if meaning else ""))
     return lines

@@ -11,7 +11,7 @@ import numpy as np
 import pyarrow as pa
 
 from . import _core, _lerobot_video
-from ._export_frames import Frames, action_unit, unit_and_meaning
+from ._export_frames import Frames, action_unit, number_units, unit_text
 from ._export_job import sync, write_json, write_text
 from ._lerobot_card import card
 from ._lerobot_features import BOOKKEEPING, Feature, Pictures, Touch, features_of
@@ -231,13 +231,18 @@ class LeRobot:
         }
 
     def _units(self) -> dict[str, str]:
-        """Of columns whose numbers have one unit, and of the action."""
+        """Of columns: one unit, or those of the numbers in turn."""
         episodes = self.frames.episodes
         units = {"action": action_unit(episodes)}
         for feature in self.features:
-            found = {unit_and_meaning(episodes, key)[0] for key in feature.keys}
-            if feature.name.startswith("observation.") and not feature.is_picture:
-                units[feature.name] = found.pop() if len(found) == 1 else ""
+            if not feature.name.startswith("observation.") or feature.is_picture:
+                continue
+            found: list[str] = []
+            for key in feature.keys:
+                width = math.prod(self.frames.shapes[key])
+                found += number_units(episodes, key, width, feature.numbers.get(key, ()))
+            if len(set(found)) == 1 or not feature.blocks:  # means are fewer numbers
+                units[feature.name] = unit_text(found)
         return {name: unit for name, unit in units.items() if unit}
 
 

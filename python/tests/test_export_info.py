@@ -7,9 +7,13 @@ import json
 import shutil
 import subprocess
 
+import h5py
 import pytest
 
 import tangere
+from tangere import export as exports
+from tangere._export_frames import action_unit, action_units
+from tangere.data import Episodes
 
 pytest.importorskip("pyarrow", reason="pyarrow is not installed")
 pytest.importorskip("zarr", reason="zarr is not installed")
@@ -133,3 +137,33 @@ def test_a_table_has_the_unit_of_every_number_of_a_body(generate, command, info,
     units = [unit for name, unit in arrays.items() if name.startswith("bodies/")]
     assert len(units) > 13 and len(set(units[:13])) > 2
     assert units == units[:13] * (len(units) // 13)
+
+
+def test_units_that_a_data_set_does_not_state_are_not_invented(generate, info, tmp_path):
+    data = generate(str(tangere.scenes()["mug"]), "--episodes", "1", "--steps", "10", "--every",
+                    "5", "--record", "left_finger")  # fmt: skip
+    with h5py.File(data / "shard-00000.h5", "r+") as file:  # as older versions have it
+        del file["scene"].attrs["action_units"]
+    episodes = Episodes(data)
+    assert set(action_units(episodes)) == {""} and action_unit(episodes) == ""
+
+
+MUG = "m/s, m/s, m/s, rad/s, rad/s, rad/s"
+
+
+@pytest.mark.parametrize("to, options, wanted", [
+    ("lerobot", {}, {"observation.state": "m, m, m, m/s, m/s, m/s"}),
+    ("zarr", {"privileged": True}, {"data/q": "m", "data/v": "m/s", "data/v_privileged": MUG}),
+    ("ftp1", {"joints": "hand.position"}, {"data/right_arm_joints": "m"}),
+    ("univtac", {}, {"embodiment/joint": "m"}),
+])  # fmt: skip
+def test_coordinates_have_their_units(mugs, info, tmp_path, to, options, wanted):
+    exports.export(mugs, tmp_path / "out", to, workers=1, **options)
+    units = {array["name"]: array["unit"] for array in info(tmp_path / "out")[1]["arrays"]}
+    assert {name: units[name] for name in wanted} == wanted
+
+
+@pytest.fixture(scope="module")
+def mugs(generate):
+    return generate(str(tangere.scenes()["mug"]), "--episodes", "1", "--steps", "10", "--every",
+                    "5", "--record", "q,v,left_finger")  # fmt: skip
