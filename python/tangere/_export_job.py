@@ -30,7 +30,7 @@ import threading
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Callable, Iterator, Protocol
+from typing import Any, Callable, Collection, Iterator, Protocol
 
 from . import _core
 from ._export_pool import Pool
@@ -356,8 +356,12 @@ class Folder:
 
     def _check_begun(self) -> None:
         """Compares the files that were there before any part with their sums."""
-        said = json.loads((self.part / ".parts/job.json").read_text(encoding="utf-8"))
-        for name, (_, size, total) in said.get("begun", {}).items():
+        job = self.part / ".parts/job.json"
+        begun = json.loads(job.read_text(encoding="utf-8")).get("begun", {})
+        if not isinstance(begun, dict) or not all(map(_is_entry, begun.values())):
+            raise self._damaged(job, "its 'begun' is no list of files with their sums")
+        self._check_foreign(begun)
+        for name, (_, size, total) in begun.items():
             path = self.part / name
             ((_, found, now),) = sums_of(self.part, [name], False).values() or ((0, 0, 0),)
             ended = name == self._format.origin and _job_in(path) == self._name
@@ -367,6 +371,21 @@ class Folder:
                     f"it has {found} bytes with the checksum {now:08x}; expected {size} with "
                     f"{total:08x}",
                 )
+
+    def _check_foreign(self, begun: Collection[str]) -> None:
+        """Files of the numbers which this export did not write; a reader would take them for parts.
+        What a killed run was writing is removed."""
+        known = {*begun, *self._format.common}
+        for part in range(len(self._format.parts)):
+            known.update(self._format.files(part))
+        for path in (p for top in ("data", "hdf5") for p in sorted((self.part / top).rglob("*"))):
+            if path.is_dir() or path.name[0] == "." or str(path.relative_to(self.part)) in known:
+                continue
+            if path.suffix != ".partial":  # zarr's
+                raise _core.InputError(
+                    f"'{path}' is not a file of this export; remove it and resume again"
+                )
+            path.unlink()
 
     def _damaged(self, path: Path, why: str) -> _core.IoError:
         return _core.IoError(
@@ -406,6 +425,11 @@ class Folder:
                 raise _core.InputError(
                     f"{self.output} is no {self._format.kind}; it is not overwritten"
                 )
+
+
+def _is_entry(value: Any) -> bool:
+    """Whether it is what `sums_of` has of a file."""
+    return isinstance(value, list) and [type(number) for number in value] == [int] * 3
 
 
 def _job_in(path: Path) -> str:

@@ -305,6 +305,8 @@ def _place(part: int) -> dict[str, int]:
 def task_text(frames: Frames, text: str | None) -> str:
     """What a policy that reads a text is told."""
     episodes = frames.episodes
+    if text is not None and not isinstance(text, str):
+        raise _core.InputError(f"task {text!r}; expected a text")
     if text is not None:
         return text
     if not episodes.task:

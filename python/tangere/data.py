@@ -140,7 +140,13 @@ class Episodes:
             known = list(file.get("mask", ()))
             if name not in known:
                 raise _core.InputError(f"{self.masks}: no mask {name!r}; it has {known}")
-            names = [n.decode() for n in file["mask"][name][()]]
+            rows = file["mask"][name]
+            if not isinstance(rows, h5py.Dataset) or rows.dtype.kind not in "SO" or rows.ndim != 1:
+                raise _core.InputError(
+                    f"{self.masks}: mask {name!r} is no list of texts; expected names of demos, "
+                    "such as 'demo_3'"
+                )
+            names = [n.decode() for n in rows[()]]
         _core.check_mask(self.masks, name)
         lost = [n for n in names if n not in self._index]
         if lost:

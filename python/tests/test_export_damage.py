@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 import tangere
+from tangere import _export_job
 from tangere import export as exports
 from tangere.data import Episodes
 
@@ -326,6 +327,52 @@ def test_a_changed_description_of_an_array_is_found(sets, command, tmp_path, to,
     edit('"order": "C"', '"order": "F"')(about)
     run = subprocess.run([command, "validate", copy], capture_output=True, text=True)
     assert run.returncode == 3 and f"'{about}' is damaged: the checksum of its" in run.stderr
+
+
+@pytest.mark.parametrize("to, name", [
+    ("zarr", "data/tactile/7.0.0.0"), ("ftp1", "data/other/0"), ("univtac", "hdf5/7.h5"),
+])  # fmt: skip
+def test_a_foreign_file_is_not_taken_by_a_resumed_run(pushes, tmp_path, monkeypatch, to, name):
+    out, part = tmp_path / "out", tmp_path / "out.part"
+
+    def stop(folder):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(_export_job.Folder, "finish", stop)
+        with pytest.raises(KeyboardInterrupt):
+            exports.export(pushes, out, to, workers=1)
+    (part / name).parent.mkdir(exist_ok=True)
+    (part / name).write_bytes(b"mine")
+    (part / name).with_suffix(".partial").write_bytes(b"a killed run's")
+    with pytest.raises(tangere.InputError, match="is not a file of this export; remove it"):
+        exports.export(pushes, out, to, workers=1, resume=True)
+    assert (part / name).read_bytes() == b"mine"
+    (part / name).unlink()
+    assert exports.export(pushes, out, to, workers=1, resume=True).complete
+    assert not list(out.rglob("*.partial")) and not part.exists()
+
+
+def test_damaged_sums_of_a_stopped_run_are_named(pushes, tmp_path, monkeypatch):
+    with monkeypatch.context() as patch:
+        patch.setattr(_export_job.Folder, "finish", lambda folder: sys.exit(75))
+        with pytest.raises(SystemExit):
+            exports.export(pushes, tmp_path / "out", "zarr", workers=1)
+    job = tmp_path / "out.part/.parts/job.json"
+    job.write_text(json.dumps(json.loads(job.read_text()) | {"begun": [1]}))
+    with pytest.raises(tangere.IoError, match="job.json' is damaged: its 'begun' is no list"):
+        exports.export(pushes, tmp_path / "out", "zarr", workers=1, resume=True)
+
+
+def test_a_mask_of_numbers_and_a_task_that_is_no_text_are_refused(pushes, tmp_path):
+    data = tmp_path / "set"
+    shutil.copytree(pushes, data)
+    with h5py.File(data / "robomimic.hdf5", "r+") as file:
+        file["mask/mine"] = np.arange(3)
+    with pytest.raises(tangere.InputError, match="mask 'mine' is no list of texts; expected names"):
+        exports.export(data, tmp_path / "out", "zarr", mask="mine")
+    with pytest.raises(tangere.InputError, match="task 5; expected a text"):
+        exports.export(data, tmp_path / "out", "lerobot", task=5)
 
 
 def test_an_export_of_an_older_version_has_no_sums(sets, command, tmp_path):
