@@ -28,7 +28,7 @@ const Words kFormats{"lerobot", "zarr", "ftp1", "univtac"};
 // argv[1] is the folder of a package beside the program, or empty; argv[2] is the module, argv[3]
 // the subcommand that it serves. A missing package is the world's mistake, so the code is 3.
 constexpr const char* kStart = R"(
-import importlib, importlib.util, json, sys
+import importlib, importlib.util, json, os, signal, sys
 place, module, command, words = sys.argv[1], sys.argv[2], sys.argv[3], sys.argv[4:]
 sys.argv = [f"tangere {command}", *words]
 if place:
@@ -44,12 +44,19 @@ def missing(name, package):
         print(json.dumps({"command": command, "exit_code": 3, "error": text}))
     print(f"tangere {command}: {text}", file=sys.stderr)
     sys.exit(3)
+def stop(*_):
+    print(f"tangere {command}: stopped", file=sys.stderr, flush=True)
+    os._exit(130)
+before = signal.getsignal(signal.SIGINT)
+if before != signal.SIG_IGN:
+    signal.signal(signal.SIGINT, stop)
 if importlib.util.find_spec("tangere") is None:
     missing("tangere", "'.[data]'")
 try:
     main = importlib.import_module(module).main
 except ModuleNotFoundError as error:
     missing(error.name, {"PIL": "pillow"}.get(error.name, error.name))
+signal.signal(signal.SIGINT, before)
 sys.exit(main(words, prog=f"tangere {command}"))
 )";
 

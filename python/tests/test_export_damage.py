@@ -8,6 +8,7 @@ import json
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
 
@@ -373,6 +374,20 @@ def test_a_mask_of_numbers_and_a_task_that_is_no_text_are_refused(pushes, tmp_pa
         exports.export(data, tmp_path / "out", "zarr", mask="mine")
     with pytest.raises(tangere.InputError, match="task 5; expected a text"):
         exports.export(data, tmp_path / "out", "lerobot", task=5)
+
+
+def test_a_stop_during_imports_is_no_traceback(pushes, command, tmp_path):
+    (tmp_path / "numpy.py").write_text("import time\nprint(1, flush=True)\ntime.sleep(60)\n")
+    path = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
+    process = subprocess.Popen(
+        [command, "export", pushes, tmp_path / "out", "--to", "zarr"], text=True,
+        env=os.environ | {"PYTHONPATH": path, "TANGERE_PYTHON": sys.executable},
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+    )  # fmt: skip
+    assert process.stdout.readline() == "1\n"
+    process.send_signal(signal.SIGINT)
+    assert process.communicate(timeout=30)[1] == "tangere export: stopped\n"
+    assert process.returncode == 130
 
 
 def test_an_export_of_an_older_version_has_no_sums(sets, command, tmp_path):
