@@ -211,6 +211,15 @@ def main() -> int:
     args = parser.parse_args()
     if args.episodes < len(PARTS):
         parser.error(f"--episodes {args.episodes}; expected {len(PARTS)} or more, one of each part")
+    try:
+        return write(args)
+    except (OSError, tangere.InputError, tangere.IoError) as error:
+        print(f"collection.py: {error}", file=sys.stderr)
+        return 2 if isinstance(error, tangere.InputError) else 3
+
+
+def write(args: argparse.Namespace) -> int:
+    """Makes the parts, the card and the exports; returns the exit code."""
     make(args.output, args.episodes, args.seed)
     merged = [(args.output / part.name / "robomimic.hdf5").is_file() for part in PARTS]
     if not all(merged):

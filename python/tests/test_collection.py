@@ -90,3 +90,13 @@ def test_the_episodes_are_those_asked_for(collection, monkeypatch, capsys):
 def test_a_scene_that_has_changed_is_told(collection):
     with pytest.raises(tangere.InputError, match="mug: no 'nothing like it'; expected the scene"):
         collection.changed("mug", (("nothing like it", "x"),))
+
+
+def test_other_settings_are_refused_in_a_sentence(collection, tmp_path, monkeypatch, capsys):
+    def refuse(*arguments):
+        raise tangere.InputError("'box_pushing' was made with other settings")
+
+    monkeypatch.setattr(collection, "make", refuse)
+    monkeypatch.setattr(sys, "argv", ["collection.py", str(tmp_path), "--seed", "2"])
+    assert collection.main() == 2
+    assert capsys.readouterr().err == "collection.py: 'box_pushing' was made with other settings\n"
