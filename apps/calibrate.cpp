@@ -325,6 +325,24 @@ std::string level_text(const Scene& scene) {
       last, table->depth.end()[-2]);
 }
 
+/// Says that a fit leaves much of the forces; "" if it does not.
+std::string misfit_text(const Calibration& found) {
+  constexpr double kMuch = 0.15, kMuchOfNorm = 0.4;
+  const PressError& error = found.normal;
+  if (found.numbers.empty() || !(error.root_mean_square > kMuch || error.by_norm > kMuchOfNorm))
+    return "";
+  return fmt::format(
+      "the fit leaves {} of the peak and {} of the forces' root mean square; expected {} and {} at "
+      "most: points in another order than the layout's (rows and columns), units, places or depths "
+      "that are not those of the forces, a reading of another sensor, or another indenter",
+      percent(error.root_mean_square), percent(error.by_norm), percent(kMuch),
+      percent(kMuchOfNorm));
+}
+
+bool is_fitted(const Calibration& found, const char* name) {
+  return std::ranges::count(found.numbers, name, &FittedNumber::name) > 0;
+}
+
 /// Whether numbers of the layout are fitted, if there are any. `usual`: without names.
 bool fits_layout(const CalibrateArguments& a, bool usual) {
   return a.numbers.empty() ? usual : !std::ranges::all_of(a.numbers, is_of_recording);
@@ -398,6 +416,9 @@ int run_calibrate(const CalibrateArguments& a, const Console& console) {
   const std::size_t said = warnings.size();
   const Scene skin = press_scene(written.layout, a.indenter);
   std::ranges::copy(skin_warnings(skin, recording), std::back_inserter(warnings));
+  if (is_fitted(found, kRelaxation) || is_fitted(found, kShear) || is_fitted(found, kFriction))
+    std::ranges::copy(rate_warnings(skin, recording), std::back_inserter(warnings));
+  if (const std::string misfit = misfit_text(found); !misfit.empty()) warnings.push_back(misfit);
   if (const std::string level = level_text(skin); fitted.knots > 0 && !level.empty())
     warnings.push_back(level);
   warn(warnings, said, a.recording, console);

@@ -103,7 +103,8 @@ std::string friction_text(const CalibrationReport& report) {
   for (std::size_t k = 0; k < friction.moved.size(); ++k) {
     const FittedNumber &moved = friction.moved[k], &number = report.found.numbers[k];
     if (moved.name.starts_with("pressure") && k + 1 < std::size_t(report.knots)) continue;
-    const bool zero = moved.name == kZero || moved.name == kForceZero;
+    const bool zero = moved.name == kZero || moved.name == kForceZero || moved.name == kPlaceX ||
+                      moved.name == kPlaceY;
     text += between + label_of(moved.name, report) +
             (zero ? fmt::format(" is {:.3g} larger", moved.value)
                   : fmt::format(" changes by {:+.2g} %", 100 * moved.value / number.value));

@@ -7,6 +7,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <optional>
 
@@ -42,7 +43,8 @@ constexpr Column<ChannelRecording> kChannelColumns[] = {
     {"y", "m", &ChannelRecording::y},
     {"shear", "m", &ChannelRecording::shear}};
 constexpr const char *kChannel = "channel_", *kField = "field";
-constexpr std::size_t kMostNotes = 4;  // columns that are named one by one
+constexpr const char* kBetween = "_ [](),";  // a name and its unit
+constexpr std::size_t kMostNotes = 4;        // columns that are named one by one
 
 /// A column of the table that stands for one of another name, and the factor of its numbers.
 struct Alias {
@@ -59,9 +61,24 @@ Alias read_alias(const std::string& text) {
     out.factor = std::strtod(factor.c_str(), &end);
     out.column = end == factor.c_str() + factor.size() ? out.column.substr(times + 1) : "";
   }
-  if (out.name.empty() || out.column.empty() || out.factor == 0)
+  if (out.name.empty() || out.column.empty())
     throw InputError(
         fmt::format("--column '{}'; expected NAME=COLUMN or NAME=FACTOR*COLUMN", text));
+  if (!std::isfinite(out.factor) || out.factor == 0)
+    throw InputError(fmt::format(
+        "--column '{}': a factor of {}; expected a finite one other than 0", text, out.factor));
+  return out;
+}
+
+std::vector<Alias> read_aliases(std::span<const std::string> texts) {
+  std::vector<Alias> out;
+  for (const std::string& text : texts) {
+    out.push_back(read_alias(text));
+    for (std::size_t k = 0; k + 1 < out.size(); ++k)
+      if (out[k].name == out.back().name)
+        throw InputError(fmt::format("--column '{}' and --column '{}'; expected one column for {}",
+                                     texts[k], text, out[k].name));
+  }
   return out;
 }
 
@@ -76,7 +93,6 @@ struct Found {
 /// Returns the column that a name of the table stands for; none for others, such as force_std.
 template <class Recording>
 Found<Recording> find_column(std::span<const Column<Recording>> columns, const std::string& name) {
-  constexpr const char* kBetween = "_ [](),";
   for (const Column<Recording>& column : columns) {
     if (!name.starts_with(column.name)) continue;
     const std::string rest = name.substr(std::string(column.name).size());
@@ -89,6 +105,19 @@ Found<Recording> find_column(std::span<const Column<Recording>> columns, const s
     if (unit == std::string("m") + column.unit) return {&column, 1e-3, unit};
   }
   return {};
+}
+
+/// "; the field 'taxel/0_mN' is read by --column field=0.001*taxel": where no other was found.
+std::string field_hint(const NamedColumns& table) {
+  for (const std::string& name : table.names) {
+    const std::size_t at = name.find("/0");
+    if (at == 0 || at == std::string::npos) continue;
+    const std::string rest = name.substr(at + 2);
+    if (!rest.empty() && std::string(kBetween).find(rest[0]) == std::string::npos) continue;
+    return fmt::format("; the field '{}' is read by --column {}={}{}", name, kField,
+                       rest.find("mN") == std::string::npos ? "" : "0.001*", name.substr(0, at));
+  }
+  return "";
 }
 
 /// Copies the columns that a recording has. Calls other(number, name) for the rest, and
@@ -120,9 +149,10 @@ void copy_columns(const NamedColumns& table, std::span<const Column<Recording>> 
   }
   for (const Column<Recording>& column : columns)
     if (column.needed && (out.*column.member).empty())
-      throw InputError(fmt::format("{}: no column '{}' among {}; expected one in {} or m{}", path,
+      throw InputError(fmt::format("{}: no column '{}' among {}; expected one in {} or m{}{}", path,
                                    column.name, fmt::join(table.names, ", "), column.unit,
-                                   column.unit));
+                                   column.unit,
+                                   column.name == std::string("force") ? field_hint(table) : ""));
 }
 
 void note_unused(const Console& console, const std::string& path,
@@ -135,10 +165,12 @@ void note_unused(const Console& console, const std::string& path,
       console.note(fmt::format("{}: column '{}' is not used", path, name));
 }
 
-/// The number behind the '/' of a column's name; none for others.
-std::optional<std::size_t> number_in(const std::string& name, const std::string& before) {
+/// The number behind the '/' of a column's name; none for others. `unit`: whether one may follow.
+std::optional<std::size_t> number_in(const std::string& name, const std::string& before,
+                                     bool unit) {
   if (!name.starts_with(before + "/")) return std::nullopt;
-  const std::string digits = name.substr(before.size() + 1);
+  std::string digits = name.substr(before.size() + 1);
+  if (unit) digits.resize(std::min(digits.find_first_of(kBetween), digits.size()));
   if (digits.empty() || digits.size() > 6 ||
       digits.find_first_not_of("0123456789") != std::string::npos)
     return std::nullopt;
@@ -168,7 +200,8 @@ FieldColumns find_field(const NamedColumns& table, const PressTableSensor& senso
   for (const Alias& name : names) {
     std::vector<std::pair<std::size_t, std::size_t>> found;  // number, column
     for (std::size_t c = 0; c < table.names.size(); ++c)
-      if (const auto number = number_in(table.names[c], name.column)) found.push_back({*number, c});
+      if (const auto number = number_in(table.names[c], name.column, named))
+        found.push_back({*number, c});
     if (found.empty()) continue;
     if (!out.at.empty())
       throw InputError(fmt::format("{}two fields, '{}/0' and '{}/0'; expected --column {}=NAME",
@@ -211,8 +244,7 @@ void copy_field(const NamedColumns& table, const FieldColumns& columns, std::siz
 PressRecording read_press(const std::string& path, const PressTableSensor& sensor,
                           const Console& console) {
   const NamedColumns table = read_named_columns(path);
-  std::vector<Alias> aliases;
-  for (const std::string& text : sensor.columns) aliases.push_back(read_alias(text));
+  const std::vector<Alias> aliases = read_aliases(sensor.columns);
   const FieldColumns field = find_field(table, sensor, aliases);
   const std::span<const Column<PressRecording>> columns =
       field.at.empty() ? std::span<const Column<PressRecording>>(kColumns) : kFieldColumns;

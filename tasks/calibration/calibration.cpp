@@ -47,6 +47,7 @@ PressError error_of(std::span<const double> computed, std::span<const double> re
                     std::span<const int> rows, std::size_t width) {
   PressError out;
   const double peak = peak_of(recorded);
+  double recorded_squares = 0;
   for (const int row : rows) {
     double own = 0, squares = 0, off_squares = 0;
     for (std::size_t k = width * std::size_t(row); k < width * (std::size_t(row) + 1); ++k) {
@@ -55,11 +56,12 @@ PressError error_of(std::span<const double> computed, std::span<const double> re
       squares += f * f, off_squares += off * off;
       out.largest = std::max(out.largest, off / peak);
     }
-    out.root_mean_square += off_squares;
+    out.root_mean_square += off_squares, recorded_squares += squares;
     if (own > kSmallest * peak)
       out.largest_by_row = std::max(out.largest_by_row, std::sqrt(off_squares / squares));
   }
   out.rows = int(rows.size());
+  if (recorded_squares > 0) out.by_norm = std::sqrt(out.root_mean_square / recorded_squares);
   if (out.rows > 0)
     out.root_mean_square =
         std::sqrt(out.root_mean_square / (double(out.rows) * double(width))) / peak;
@@ -389,8 +391,10 @@ std::vector<double> all_forces(const CalibrationRequest& request, const PressRec
 /// Finds what friction does, or would do where the fit is without it.
 FrictionShare friction_share(const CalibrationRequest& request, const PressRecording& r,
                              const ForceFit& along, const SkinNumbers& found) {
-  const std::vector<double> share = friction_forces(request, r, found);
   FrictionShare out;
+  const bool pressures = r.points > 0 && r.shear_field.empty();  // alone: without friction
+  if (pressures && !request.friction) return out;
+  const std::vector<double> share = friction_forces(request, r, found);
   if (share.empty()) return out;
   out.mu = request.scene(found).sensors.at(0).coefficients.mu;
   out.largest = peak_of(share) / peak_of(r.normal());
@@ -427,13 +431,16 @@ void add_fit(const ForceFit& fit, Calibration& out) {
   out.untold.insert(out.untold.end(), fit.untold().begin(), fit.untold().end());
 }
 
-/// Refuses a table of more numbers than rows. Of others the confidence says what is not told.
-void check_table_rows(const CalibrationRequest& request, const Names& names, std::size_t rows) {
+/// Refuses a table of more numbers than forces. Of others the confidence says what is not told.
+/// `width`: forces of a row.
+void check_table_rows(const CalibrationRequest& request, const Names& names, std::size_t rows,
+                      std::size_t width) {
   if (std::ranges::count(names.normal, kTable) == 0) return;
   const std::size_t fitted = names.normal.size() + std::size_t(request.knots) - 1;
-  if (fitted > rows)
-    throw InputError(
-        fmt::format("{} rows to fit {} numbers; expected a row for each at least", rows, fitted));
+  if (fitted > rows * width)
+    throw InputError(fmt::format("{} rows{} to fit {} numbers; expected a {} for each at least",
+                                 rows, width > 1 ? fmt::format(" of {} forces", width) : "", fitted,
+                                 width > 1 ? "force" : "row"));
 }
 
 /// What the fit of a shear follows.
@@ -475,7 +482,8 @@ void fit_shear(const ShearFit& of, Calibration& out) {
     if (auto [error, fit] = fit_from(kSlipStarts[k]); error < least) least = error, across = fit;
   across.add_errors_of(of.along);
   add_fit(across, out);
-  if (std::ranges::count(across.untold(), kFriction, &UntoldNumber::name) > 0)
+  if (std::ranges::count(across.untold(), kFriction, &UntoldNumber::name) > 0 &&
+      out.found.at(kFriction) > 0)
     out.least_friction = largest_ratio(r);
   const std::vector<double> shear = path(out.found);
   out.shear = error_of(shear, recorded, out.rows, width);
@@ -510,7 +518,7 @@ Calibration calibrate(const CalibrationRequest& request, const PressRecording& r
     throw InputError(
         fmt::format("a table up to the depth {} m; expected depths positive into the skin", depth));
   const Names names = choose_numbers(request, recording, rows, out.untold);
-  check_table_rows(request, names, rows.size());
+  check_table_rows(request, names, rows.size(), normal_width(recording));
   if (!names.shear.empty() && !(peak_of(recording.tangential()) > 0))
     throw InputError("a shear without any force; expected shear forces, or no columns of a shear");
 

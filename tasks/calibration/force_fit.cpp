@@ -13,6 +13,9 @@ namespace {
 
 constexpr double kLeastInfluence = 1e-6;  // root mean square change, of the peak, by a whole number
 constexpr double kLeastSlip = 0.03;       // share of the forces that slip, by their squares
+constexpr double kLittleFriction = 0.05;  // may be none
+constexpr const char* kFrictionless =
+    "it is about 0: without friction the forces along the skin fit as well; write mu=\"0\"";
 // Steps of x for the differences of intervals: a share of a number, or of depth or peak.
 constexpr double kLongestStep = 0.1, kShortestStep = 1e-5, kShorter = 4;
 constexpr int kSecantPasses = 4;
@@ -87,8 +90,12 @@ void ForceFit::run(std::vector<std::string> names, const SkinNumbers& start, Ski
     std::size_t weak = weakest();
     if (weak == names.size()) find_secants(), weak = weakest();
     if (weak == names.size()) return;
-    untold_.push_back({names[weak], reason(names[weak])});
-    if (names[weak] == kFriction || names[weak] == kSliderForce)  // so that it stays without slip
+    const bool frictionless = names[weak] == kFriction && vanishes();
+    untold_.push_back({names[weak], frictionless ? kFrictionless : reason(names[weak])});
+    if (frictionless)
+      fixed[kFriction] = 0;
+    else if (names[weak] == kFriction ||
+             names[weak] == kSliderForce)  // so that it stays without slip
       fixed[names[weak]] = scales_[weak].value(found_.x[weak]);
     if (names[weak] == kForceZero) held.push_back(names[weak]);
     names.erase(names.begin() + std::ptrdiff_t(weak));
@@ -240,6 +247,17 @@ bool ForceFit::holds(std::size_t friction) const {
   double squares = 0;
   for (std::size_t k = 0; k < now.size(); ++k) squares += std::pow(then[k] - now[k], 2);
   return std::sqrt(squares / double(now.size())) < 0.01 * kLeastSlip;
+}
+
+/// Whether a friction is about 0: one of 1 would change the forces.
+bool ForceFit::vanishes() const {
+  SkinNumbers numbers = found();
+  if (!(numbers[kFriction] < kLittleFriction)) return false;
+  const std::vector<double> now = residuals_of(numbers);
+  numbers[kFriction] = 1;
+  std::vector<double> then = residuals_of(numbers);
+  for (std::size_t k = 0; k < now.size(); ++k) then[k] -= now[k];
+  return std::sqrt(squares_of(then) / double(now.size())) > kLeastSlip;
 }
 
 /// Returns the first number that has no influence, or that nothing tells from the others, or whose

@@ -100,6 +100,7 @@ class ForceFit {
   [[nodiscard]] std::vector<double> slope_by(const std::string& held) const;
   [[nodiscard]] SkinNumbers moved(std::size_t number, double dx) const;
   [[nodiscard]] bool holds(std::size_t friction) const;
+  [[nodiscard]] bool vanishes() const;
   [[nodiscard]] std::vector<double> secant(std::size_t k, double step) const;
   [[nodiscard]] std::vector<double> half_intervals() const;
   [[nodiscard]] double secant_step(std::size_t k, double length) const;

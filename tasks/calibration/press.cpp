@@ -83,18 +83,20 @@ std::vector<double> PressRecording::rates() const {
 }
 
 std::vector<int> PressRecording::turns() const {
-  constexpr double kJump = 0.5, kMostTurns = 0.2;
+  constexpr double kJumps[] = {0.2, 0.5}, kMostTurns = 0.2;
   double largest = 0;
   std::vector<double> rate;  // from each row to the next
   for (std::size_t k = 1; k < time.size(); ++k) {
     rate.push_back((depth[k] - depth[k - 1]) / (time[k] - time[k - 1]));
     largest = std::max(largest, std::abs(rate.back()));
   }
-  std::vector<int> out;
-  for (std::size_t k = 1; k < rate.size(); ++k)
-    if (std::abs(rate[k] - rate[k - 1]) > kJump * largest) out.push_back(int(k));
-  if (double(out.size()) > kMostTurns * double(rows())) out.clear();
-  return out;
+  for (const double jump : kJumps) {
+    std::vector<int> out;
+    for (std::size_t k = 1; k < rate.size(); ++k)
+      if (std::abs(rate[k] - rate[k - 1]) > jump * largest) out.push_back(int(k));
+    if (double(out.size()) <= kMostTurns * double(rows())) return out;
+  }
+  return {};
 }
 
 Scene placed_indenter(const Scene& scene) {

@@ -40,8 +40,9 @@ struct PressRecording {
   }
   /// Returns the rate of the depth [m/s] by differences between neighbours; zeros without times.
   [[nodiscard]] std::vector<double> rates() const;
-  /// Returns the rows at which the rate jumps by more than half of its largest size, so that it is
-  /// not known there; none without times, and none where more than a fifth of the rows would be.
+  /// Returns the rows at which the rate jumps by more than a fifth of its largest size, so that it
+  /// is not known there, or by more than half where the former are more than a fifth of the rows;
+  /// none where these are, too, and none without times.
   [[nodiscard]] std::vector<int> turns() const;
 };
 

@@ -22,7 +22,10 @@ constexpr double kSoftest = 5e5, kStiffest = 5e10;          // by area, without 
 constexpr double kFilm = 2.3;                               // kn t/E of a film (docs/skin.md)
 constexpr double kCellError = 0.09, kMostCellError = 0.04;  // h/√(R d) has this error of a force
 constexpr int kFewestPoints = 9;
-constexpr double kUsualLayerCell = 0.2;  // of a layer, by the thickness
+constexpr double kNoisyRate = 0.05;       // error of a rate, of the largest
+constexpr double kFastShear = 0.05;       // speed · relaxation, of the slip distance
+constexpr std::size_t kFewestDepths = 8;  // whose noise is estimated
+constexpr double kUsualLayerCell = 0.2;   // of a layer, by the thickness
 
 /// "; 0.0075 if it is in mm".
 std::string factor_text(double value, double factor, const char* what) {
@@ -220,6 +223,80 @@ std::vector<std::string> skin_warnings(const Scene& scene, const PressRecording&
   if (other >= low && other <= high)
     text += fmt::format("; {:.3g} if forces are {}", other, force_unit_text(r, factor < 1));
   return {text};
+}
+
+namespace {
+
+double median(std::vector<double> numbers) {
+  if (numbers.empty()) return 0;
+  const auto middle = numbers.begin() + std::ssize(numbers) / 2;
+  std::ranges::nth_element(numbers, middle);
+  return *middle;
+}
+
+double largest_step(const std::vector<double>& column, const std::vector<double>& time) {
+  double out = 0;
+  for (std::size_t k = 1; k < column.size(); ++k)
+    out = std::max(out, std::abs(column[k] - column[k - 1]) / (time[k] - time[k - 1]));
+  return out;
+}
+
+/// Standard deviation of the errors of evenly timed depths, by third differences, which a smooth
+/// motion has hardly; of normal errors σ their median size is 0.6745 √20 σ [m].
+double depth_noise(const PressRecording& r) {
+  std::vector<double> third;
+  for (std::size_t k = 3; k < r.rows(); ++k)
+    third.push_back(
+        std::abs(r.depth[k] - 3 * r.depth[k - 1] + 3 * r.depth[k - 2] - r.depth[k - 3]));
+  return median(third) / (0.6745 * std::sqrt(20.0));
+}
+
+void warn_of_rates(const PressRecording& r, double relaxation, std::vector<std::string>& out) {
+  std::vector<double> steps;
+  for (std::size_t k = 1; k < r.time.size(); ++k) steps.push_back(r.time[k] - r.time[k - 1]);
+  const double step = median(steps);
+  if (step > relaxation)
+    out.push_back(fmt::format(
+        "rows are {:.3g} s apart, longer than the relaxation of {:.3g} s: rates between rows are "
+        "means, which the intervals do not contain; expected {:.2g} s at most",
+        step, relaxation, relaxation));
+  if (r.rows() < kFewestDepths) return;
+  double fastest = 0;
+  for (const double rate : r.rates()) fastest = std::max(fastest, std::abs(rate));
+  const double noise = depth_noise(r), error = noise / (std::sqrt(2.0) * step);
+  if (error > kNoisyRate * fastest)
+    out.push_back(fmt::format(
+        "depths scatter by about {:.2g} m, so rates by {:.2g} m/s, {:.0f} % of the largest: the "
+        "intervals do not contain errors of the depth, and the relaxation found may be too small",
+        noise, error, 100 * error / fastest));
+}
+
+/// A shear at the speed v has kt v = ks τ v beside its springs, which slip at mu N.
+void warn_of_shear_speed(const TactileDescription& d, const PressRecording& r, double relaxation,
+                         std::vector<std::string>& out) {
+  const ContactCoefficients& c = d.coefficients;
+  const double depth = *std::ranges::max_element(r.depth), area = d.cell > 0 ? d.cell : 1,
+               kn = d.table ? d.table->stiffness() * area : c.kn;
+  if (!(c.ks > 0 && c.mu > 0 && kn > 0 && depth > 0)) return;
+  const double speed = largest_step(r.shear, r.time), slip = c.mu * kn * depth / c.ks;
+  if (speed * relaxation > kFastShear * slip)
+    out.push_back(fmt::format(
+        "a shear at {:.3g} m/s and a relaxation of {:.3g} s: {:.2g} m, {:.0f} % of the {:.2g} m at "
+        "which the deepest point slips; the forces of a shear are computed as slow, so ks and mu "
+        "take up what the speed does: shear more slowly",
+        speed, relaxation, speed * relaxation, 100 * speed * relaxation / slip, slip));
+}
+
+}  // namespace
+
+std::vector<std::string> rate_warnings(const Scene& scene, const PressRecording& r) {
+  const TactileDescription& d = scene.sensors.at(0);
+  const double relaxation = d.table ? d.table->relaxation : d.material ? d.material->relaxation : 0;
+  std::vector<std::string> out;
+  if (r.time.size() < 2 || !(relaxation > 0)) return out;
+  warn_of_rates(r, relaxation, out);
+  if (!r.shear.empty()) warn_of_shear_speed(d, r, relaxation, out);
+  return out;
 }
 
 std::string why_no_touch(const Scene& scene, double depth) {

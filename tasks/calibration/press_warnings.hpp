@@ -20,6 +20,12 @@ std::vector<std::string> press_warnings(const Scene& scene, const PressRecording
 /// skin has. `scene`: of placed_indenter(), with the fitted numbers. Empty if nothing is.
 std::vector<std::string> skin_warnings(const Scene& scene, const PressRecording& recording);
 
+/// Returns what rates do that a fit of a recording with times does not contain: rows that are
+/// farther apart than the relaxation, rates that are noisy because depths are, and a shear whose
+/// speed changes its forces. `scene`: of placed_indenter(), with the fitted numbers. Empty for a
+/// skin without relaxation.
+std::vector<std::string> rate_warnings(const Scene& scene, const PressRecording& recording);
+
 /// Why an indenter that goes `depth` [m] deep touches no point of the sensor; "" if it does.
 /// `scene`: of placed_indenter().
 std::string why_no_touch(const Scene& scene, double depth);

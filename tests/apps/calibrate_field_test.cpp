@@ -74,6 +74,11 @@ TEST(CalibrateField, ADataSetsFieldIsFitted) {
   // Rows that are held out are predicted, and a table of pressures is fitted to the field as well.
   const json held = run_json(folder, words + Words{"--hold-out", "0.3"});
   EXPECT_LT(held["normal_held_out"]["largest_by_row"], 0.1);
+  // Two rows of 64 forces are enough for three pressures.
+  EXPECT_EQ(
+      run(folder, words + Words{"--hold-out", "18", "--table", "3", "--fit", "pressure"}).exit_code,
+      0);
+  EXPECT_THAT(text.err, Not(HasSubstr("the fit leaves")));
   const json table =
       run_json(folder, words + Words{"--table", "3", "--fit", "pressure", "-o", "table.xml"});
   EXPECT_NEAR(table["normal"]["root_mean_square"], 0, 0.05);
@@ -81,10 +86,48 @@ TEST(CalibrateField, ADataSetsFieldIsFitted) {
 }
 
 /// A row of a field of n numbers.
-std::string field_table(const std::string& name, int n, const std::string& more = "") {
+std::string field_table(const std::string& name, int n, const std::string& more = "",
+                        const std::string& unit = "") {
   std::string header = "depth_mm", row = "0.1";
-  for (int k = 0; k < n; ++k) header += "," + name + "/" + std::to_string(k), row += ",1e-3";
+  for (int k = 0; k < n; ++k) header += "," + name + "/" + std::to_string(k) + unit, row += ",1e-3";
   return header + "\n" + row + "\n" + more;
+}
+
+/// A ball of 4 mm in the middle of 8 x 8 points, whose numbers are as many places on.
+std::string shifted_press(int shift) {
+  std::string header = "depth_mm";
+  for (int k = 0; k < 64; ++k) header += ",pressure/" + std::to_string((k + shift) % 64);
+  std::string out = header + "\n";
+  for (const double depth : {1e-4, 2e-4, 3e-4}) {
+    out += std::to_string(1e3 * depth);
+    for (int k = 0; k < 64; ++k) {
+      const double x = 5e-4 * (k % 8 - 3.5), y = 5e-4 * (k / 8 - 3.5);
+      out += "," + std::to_string(50 * std::max(depth - (x * x + y * y) / 8e-3, 0.0));
+    }
+    out += "\n";
+  }
+  return out;
+}
+
+/// A fit that leaves much of the forces says so: points in another order, and a field of one value.
+TEST(CalibrateField, AFieldInAnotherOrderIsNamed) {
+  const Folder folder;
+  folder.write("skin.xml",
+               "<sensor unit=\"m-kg\">" + film_array("skin", "modulus=\"1e5\"/>") + "</sensor>");
+  const auto err = [&](const std::string& text) {
+    folder.write("p.csv", text);
+    const Outcome outcome =
+        run(folder, {"calibrate", "p.csv", "--sensor", "skin.xml", "--ball", "0.004"});
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    EXPECT_THAT(outcome.out, Not(HasSubstr("without friction")));
+    return outcome.err;
+  };
+  EXPECT_THAT(err(shifted_press(0)), Not(HasSubstr("the fit leaves")));
+  EXPECT_THAT(err(shifted_press(20)), HasSubstr("of the forces' root mean square; expected 15 %"));
+  std::string row;
+  for (int k = 0; k < 64; ++k) row += ",1e-3";
+  EXPECT_THAT(err(field_table("pressure", 64, "0.2" + row + "\n0.3" + row + "\n")),
+              HasSubstr("points in another order than the layout's (rows and columns), units"));
 }
 
 TEST(CalibrateField, WhatIsWrongWithAFieldIsNamed) {
@@ -120,10 +163,26 @@ TEST(CalibrateField, WhatIsWrongWithAFieldIsNamed) {
               HasSubstr("--column 'depth'; expected NAME=COLUMN or NAME=FACTOR*COLUMN"));
   EXPECT_THAT(err(field_table("pressure", 64), {"--column", "depth=mm*depth_mm"}),
               HasSubstr("expected NAME=COLUMN or NAME=FACTOR*COLUMN"));
+  for (const char* const factor : {"nan", "inf", "0"})
+    EXPECT_THAT(err(field_table("pressure", 64),
+                    {"--column", std::string("depth=") + factor + "*depth_mm"}),
+                HasSubstr("expected a finite one other than 0"));
+  EXPECT_THAT(err(field_table("pressure", 64),
+                  {"--column", "depth=0.001*depth_mm", "--column", "depth=depth_mm"}),
+              HasSubstr("--column 'depth=0.001*depth_mm' and --column 'depth=depth_mm'; expected "
+                        "one column for depth"));
+  EXPECT_THAT(err(field_table("taxel", 64, "", "_mN"), {}),
+              HasSubstr("; the field 'taxel/0_mN' is read by --column field=0.001*taxel"));
   EXPECT_THAT(err(field_table("pressure", 64), {"--column", "force=depth_mm"}),
               HasSubstr("--column force=…; expected one of field, time, depth"));
   EXPECT_THAT(err(field_table("pressure", 64), {"--fit", "force_zero"}),
               HasSubstr("'force_zero' cannot be fitted; expected some of modulus, zero"));
+  // A unit behind the number is left to the factor.
+  folder.write("p.csv", field_table("taxel", 64, "", "_mN"));
+  EXPECT_EQ(run(folder, {"calibrate", "p.csv", "--sensor", "skin.xml", "--ball", "0.004",
+                         "--column", "field=0.001*taxel", "--fit", "modulus"})
+                .exit_code,
+            0);
   // A field in mN is named with what it would be.
   folder.write("p.csv", field_table("taxel", 64));
   const Outcome outcome = run(folder, {"calibrate", "p.csv", "--sensor", "skin.xml", "--ball",

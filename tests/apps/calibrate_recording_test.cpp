@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "apps/calibrate_report.hpp"
 #include "tests/apps/press_recordings.hpp"
 #include "tests/apps/program.hpp"
 
@@ -315,6 +316,77 @@ TEST(CalibrateRecording, TurnsOfTheDepthAreNotFitted) {
   EXPECT_NEAR(number(answer, "modulus")["value"], 2e5, 1);
   EXPECT_NEAR(number(answer, "relaxation")["value"], kTau, 1e-4 * kTau);
   EXPECT_THAT(run(folder, kFlat).out, HasSubstr("not fitted: 1 row at which the rate"));
+}
+
+/// A ramp that ends between rows has kinks of 3/4 and 1/4 of its rate. A sine of few rows has none.
+TEST(CalibrateRecording, KinksBetweenRowsAreTurns) {
+  PressRecording hold, sine;
+  for (int k = 0; k < 40; ++k) {
+    const double t = 1e-2 * k;
+    hold.time.push_back(t), sine.time.push_back(t);
+    hold.depth.push_back(1e-2 * std::clamp(t, 0.0525, 0.2575));
+    sine.depth.push_back(1e-3 * (1 - std::cos(2 * 3.14159 * k / 40)));
+  }
+  EXPECT_EQ(hold.turns(), (std::vector<int>{5, 6, 25, 26}));
+  EXPECT_TRUE(sine.turns().empty());
+  PressRecording coarse;  // whose rates jump by more than a fifth at most rows
+  for (std::size_t k = 0; k < 40; k += 2)
+    coarse.time.push_back(sine.time[k]), coarse.depth.push_back(sine.depth[k]);
+  EXPECT_TRUE(coarse.turns().empty());
+}
+
+/// What times, depths and speeds do that a fit with relaxation does not contain.
+TEST(CalibrateRecording, WhatRatesDoIsNamed) {
+  const Folder folder;
+  folder.write("skin.xml", layout("modulus=\"1e5\" thickness=\"4e-3\" mu=\"0\""));
+  constexpr double kTau = 0.02, kFilm = 2.3 * 2e5 / kThickness * kArea;
+  const auto err = [&](double step, double noise) {
+    folder.write("press.csv", table("time,depth,force", 41, [=](int k) {
+                   const double rate = 5e-6 / step * (k <= 20 ? 2 : -1),
+                                d = 5e-6 * (k <= 20 ? 2 * k : 60 - k) + 1e-5;
+                   return std::vector<double>{step * k, d + noise * std::sin(2.5 * k * k),
+                                              kPoints * kFilm * (d + kTau * rate)};
+                 }));
+    return run(folder, kFlat).err;
+  };
+  EXPECT_EQ(err(1e-3, 0), "");
+  EXPECT_THAT(err(0.03, 0), HasSubstr("rows are 0.03 s apart, longer than the relaxation of 0.02"));
+  EXPECT_THAT(err(1e-3, 2e-6), HasSubstr("the intervals do not contain errors of the depth"));
+}
+
+/// The forces of a shear are computed as slow.
+TEST(CalibrateRecording, ASpeedOfAShearIsNamed) {
+  const Folder folder;
+  folder.write("skin.xml",
+               layout("modulus=\"2e5\" thickness=\"4e-3\" relaxation=\"0.02\" ks=\"40\" mu=\"1\""));
+  const auto err = [&](double speed) {
+    constexpr double kNormal = kPoints * 2.3 * 2e5 / kThickness * kArea * 5e-5;
+    folder.write("press.csv", table("time,depth_mm,force_N,shear,shear_force_N", 30, [=](int k) {
+                   const double shear = 4e-6 * k;
+                   return std::vector<double>{4e-6 * k / speed, 0.05, kNormal, shear,
+                                              std::min(kPoints * 40 * shear, 0.3 * kNormal)};
+                 }));
+    return run(folder, kFlat + Words{"--fit", "ks", "--fit", "mu"}).err;
+  };
+  EXPECT_THAT(err(1e-2), HasSubstr("a shear at 0.01 m/s and a relaxation of 0.02 s: 0.0002 m, "));
+  EXPECT_THAT(err(1e-5), Not(HasSubstr("a shear at")));
+}
+
+/// A place has a length, of which no share is said.
+TEST(CalibrateRecording, PlacesAreLarger) {
+  Calibration found;
+  found.numbers = {{"modulus", 2e5, 0, 0}, {"x_zero", 1e-15, 0, 0}};
+  found.friction = {0.5, 0.1, {{"modulus", 2e4, 0, 0}, {"x_zero", 1e-5, 0, 0}}};
+  const std::string text = report_text({.found = found,
+                                        .own = {},
+                                        .per_area = false,
+                                        .knots = 0,
+                                        .points = 20,
+                                        .written = {},
+                                        .other = {},
+                                        .beside = "",
+                                        .warnings = {}});
+  EXPECT_THAT(text, HasSubstr("modulus [Pa] changes by +10 %, x_zero [m] is 1e-05 larger"));
 }
 
 }  // namespace

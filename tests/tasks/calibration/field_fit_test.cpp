@@ -121,6 +121,49 @@ TEST(FieldFit, FrictionIsThatOfTheFieldAlongTheSkin) {
   }
 }
 
+/// A skin without friction has forces along the ball's normals alone.
+TEST(FieldFit, NoFrictionIsToldFromMuch) {
+  CalibrationRequest request = field_request(false);
+  request.start = {{"modulus", 1e5}, {"ks", 2e7}, {"mu", 0.8}};
+  request.numbers = {"modulus", "ks", "mu"};
+  PressRecording r;
+  for (int k = 1; k <= 5; ++k) r.depth.push_back(6e-5 * k), r.shear.push_back(0);
+  for (int k = 1; k <= 5; ++k) r.depth.push_back(3e-4), r.shear.push_back(8e-5 * k);
+  const PressPath path{
+      .depth = r.depth, .rate = {}, .time = {}, .x = r.shear, .y = {}, .fields = true};
+  r.points = kFieldPoints;
+  const Scene scene = request.scene({{"modulus", 2e5}, {"ks", 5e7}, {"mu", 0}});
+  r.shear_field = shear_forces(scene, path);
+  r.field = press_forces(scene, path);
+  const Calibration found = calibrate(request, r);
+  EXPECT_NEAR(found.found.at("modulus"), 2e5, 1);
+  EXPECT_EQ(found.found.at("mu"), 0);
+  EXPECT_EQ(found.least_friction, 0);
+  ASSERT_FALSE(found.untold.empty());
+  EXPECT_EQ(found.untold.back().name, "mu");
+  EXPECT_NE(found.untold.back().reason.find("it is about 0"), std::string::npos);
+}
+
+/// Pressures alone hold no friction, so it is not said what it would add.
+TEST(FieldFit, PressuresAloneHaveNoFriction) {
+  CalibrationRequest request = field_request(false);
+  PressRecording r;
+  for (int k = 1; k <= 5; ++k) r.depth.push_back(6e-5 * k);
+  r.points = kFieldPoints;
+  const auto scene = request.scene;
+  request.scene = [=](const SkinNumbers& numbers) {
+    SkinNumbers sticky = numbers;
+    sticky["ks"] = 5e7, sticky["mu"] = 0.5;
+    return scene(sticky);
+  };
+  r.field =
+      press_forces(request.scene({{"modulus", 2e5}}),
+                   {.depth = r.depth, .rate = {}, .time = {}, .x = {}, .y = {}, .fields = true});
+  EXPECT_EQ(calibrate(request, r).friction.mu, 0);
+  r.shear_field.assign(2 * r.field.size(), 0);
+  EXPECT_EQ(calibrate(request, r).friction.mu, 0.5);
+}
+
 TEST(FieldFit, ColumnsOfOtherLengthsAreRefused) {
   const CalibrationRequest request = field_request(false);
   const PressRecording good = placed_presses(request.scene(kFieldTruth));
