@@ -115,7 +115,7 @@ std::string field_hint(const NamedColumns& table) {
     const std::string rest = name.substr(at + 2);
     if (!rest.empty() && std::string(kBetween).find(rest[0]) == std::string::npos) continue;
     return fmt::format("; the field '{}' is read by --column {}={}{}", name, kField,
-                       rest.find("mN") == std::string::npos ? "" : "0.001*", name.substr(0, at));
+                       name.find("mN") == std::string::npos ? "" : "0.001*", name.substr(0, at));
   }
   return "";
 }

@@ -22,10 +22,10 @@ constexpr double kSoftest = 5e5, kStiffest = 5e10;          // by area, without 
 constexpr double kFilm = 2.3;                               // kn t/E of a film (docs/skin.md)
 constexpr double kCellError = 0.09, kMostCellError = 0.04;  // h/√(R d) has this error of a force
 constexpr int kFewestPoints = 9;
-constexpr double kNoisyRate = 0.05;       // error of a rate, of the largest
-constexpr double kFastShear = 0.05;       // speed · relaxation, of the slip distance
-constexpr std::size_t kFewestDepths = 8;  // whose noise is estimated
-constexpr double kUsualLayerCell = 0.2;   // of a layer, by the thickness
+constexpr double kNoisyRate = 0.05;             // error of a rate, of the largest
+constexpr double kFastShear = 0.05;             // speed · relaxation, of the slip distance
+constexpr std::size_t kFewestDifferences = 12;  // of depths, whose noise is estimated
+constexpr double kUsualLayerCell = 0.2;         // of a layer, by the thickness
 
 /// "; 0.0075 if it is in mm".
 std::string factor_text(double value, double factor, const char* what) {
@@ -244,10 +244,15 @@ double largest_step(const std::vector<double>& column, const std::vector<double>
 /// Standard deviation of the errors of evenly timed depths, by third differences, which a smooth
 /// motion has hardly; of normal errors σ their median size is 0.6745 √20 σ [m].
 double depth_noise(const PressRecording& r) {
-  std::vector<double> third;
-  for (std::size_t k = 3; k < r.rows(); ++k)
-    third.push_back(
-        std::abs(r.depth[k] - 3 * r.depth[k - 1] + 3 * r.depth[k - 2] - r.depth[k - 3]));
+  const std::vector<int> turns = r.turns();
+  std::vector<double> third;  // between turns
+  for (int k = 3; k < int(r.rows()); ++k) {
+    const auto turn = std::ranges::upper_bound(turns, k - 3);
+    if (turn != turns.end() && *turn < k) continue;
+    const double* const d = &r.depth[std::size_t(k - 3)];
+    third.push_back(std::abs(d[3] - 3 * d[2] + 3 * d[1] - d[0]));
+  }
+  if (third.size() < kFewestDifferences) return 0;
   return median(third) / (0.6745 * std::sqrt(20.0));
 }
 
@@ -260,7 +265,6 @@ void warn_of_rates(const PressRecording& r, double relaxation, std::vector<std::
         "rows are {:.3g} s apart, longer than the relaxation of {:.3g} s: rates between rows are "
         "means, which the intervals do not contain; expected {:.2g} s at most",
         step, relaxation, relaxation));
-  if (r.rows() < kFewestDepths) return;
   double fastest = 0;
   for (const double rate : r.rates()) fastest = std::max(fastest, std::abs(rate));
   const double noise = depth_noise(r), error = noise / (std::sqrt(2.0) * step);

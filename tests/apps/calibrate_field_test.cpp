@@ -109,6 +109,29 @@ std::string shifted_press(int shift) {
   return out;
 }
 
+/// A place has a length, of which no share is said.
+TEST(CalibrateField, FrictionMovesAPlaceByALength) {
+  const Folder folder;
+  folder.write("skin.xml", layout("modulus=\"1e5\" thickness=\"4e-3\" ks=\"40\" mu=\"0.5\""));
+  std::string header = "depth_mm";
+  for (int k = 0; k < 363; ++k) header += ",force/" + std::to_string(k);
+  folder.write("p.csv", table(header, 4, [](int row) {
+                 std::vector<double> out{0.05 * (row + 1)};
+                 for (int k = 0; k < 121; ++k) {
+                   const double x = 1e-3 * (k % 11 - 5), y = 1e-3 * (k / 11 - 5),
+                                depth = 5e-5 * (row + 1) - (x * x + y * y) / 8e-2;
+                   out.insert(out.end(), {0, 0, 100 * std::max(depth, 0.0)});
+                 }
+                 return out;
+               }));
+  const Outcome outcome =
+      run(folder, {"calibrate", "p.csv", "--sensor", "skin.xml", "--ball", "0.04"});
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("without friction: mu = 0.5 adds "));
+  EXPECT_THAT(outcome.out, ::testing::ContainsRegex("x_zero .m. is [^ ]+ larger"));
+  EXPECT_THAT(outcome.out, Not(HasSubstr("zero [m] changes")));
+}
+
 /// A fit that leaves much of the forces says so: points in another order, and a field of one value.
 TEST(CalibrateField, AFieldInAnotherOrderIsNamed) {
   const Folder folder;

@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "apps/calibrate_report.hpp"
+#include "tasks/calibration/press.hpp"
 #include "tests/apps/press_recordings.hpp"
 #include "tests/apps/program.hpp"
 
@@ -370,23 +370,6 @@ TEST(CalibrateRecording, ASpeedOfAShearIsNamed) {
   };
   EXPECT_THAT(err(1e-2), HasSubstr("a shear at 0.01 m/s and a relaxation of 0.02 s: 0.0002 m, "));
   EXPECT_THAT(err(1e-5), Not(HasSubstr("a shear at")));
-}
-
-/// A place has a length, of which no share is said.
-TEST(CalibrateRecording, PlacesAreLarger) {
-  Calibration found;
-  found.numbers = {{"modulus", 2e5, 0, 0}, {"x_zero", 1e-15, 0, 0}};
-  found.friction = {0.5, 0.1, {{"modulus", 2e4, 0, 0}, {"x_zero", 1e-5, 0, 0}}};
-  const std::string text = report_text({.found = found,
-                                        .own = {},
-                                        .per_area = false,
-                                        .knots = 0,
-                                        .points = 20,
-                                        .written = {},
-                                        .other = {},
-                                        .beside = "",
-                                        .warnings = {}});
-  EXPECT_THAT(text, HasSubstr("modulus [Pa] changes by +10 %, x_zero [m] is 1e-05 larger"));
 }
 
 }  // namespace
