@@ -329,13 +329,13 @@ std::string level_text(const Scene& scene) {
 std::string misfit_text(const Calibration& found) {
   constexpr double kMuch = 0.15, kMuchOfNorm = 0.4;
   const PressError& error = found.normal;
-  if (found.numbers.empty() || !(error.root_mean_square > kMuch || error.by_norm > kMuchOfNorm))
+  if (found.numbers.empty() || !(error.root_mean_square > kMuch || error.relative > kMuchOfNorm))
     return "";
   return fmt::format(
       "the fit leaves {} of the peak and {} of the forces' root mean square; expected {} and {} at "
       "most: points in another order than the layout's (rows and columns), units, places or depths "
       "that are not those of the forces, a reading of another sensor, or another indenter",
-      percent(error.root_mean_square), percent(error.by_norm), percent(kMuch),
+      percent(error.root_mean_square), percent(error.relative), percent(kMuch),
       percent(kMuchOfNorm));
 }
 

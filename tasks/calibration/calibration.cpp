@@ -61,7 +61,7 @@ PressError error_of(std::span<const double> computed, std::span<const double> re
       out.largest_by_row = std::max(out.largest_by_row, std::sqrt(off_squares / squares));
   }
   out.rows = int(rows.size());
-  if (recorded_squares > 0) out.by_norm = std::sqrt(out.root_mean_square / recorded_squares);
+  if (recorded_squares > 0) out.relative = std::sqrt(out.root_mean_square / recorded_squares);
   if (out.rows > 0)
     out.root_mean_square =
         std::sqrt(out.root_mean_square / (double(out.rows) * double(width))) / peak;

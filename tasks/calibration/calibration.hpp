@@ -42,7 +42,7 @@ struct CalibrationRequest {
 struct PressError {
   int rows = 0;
   double root_mean_square = 0, largest = 0;
-  double by_norm = 0;         ///< root mean square over that of the recorded forces
+  double relative = 0;        ///< root mean square over that of the recorded forces
   double largest_by_row = 0;  ///< over the row's own force, of rows above a twentieth of the peak
 };
 
