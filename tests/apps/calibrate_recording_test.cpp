@@ -345,7 +345,7 @@ TEST(CalibrateRecording, WhatRatesDoIsNamed) {
                    const double rate = 5e-6 / step * (k <= 20 ? 2 : -1),
                                 d = 5e-6 * (k <= 20 ? 2 * k : 60 - k) + 1e-5;
                    return std::vector<double>{step * k, d + noise * std::sin(2.5 * k * k),
-                                              kPoints * kFilm * (d + kTau * rate)};
+                                              kPoints * kFilm * d * (1 + kTau * rate / 4e-4)};
                  }));
     return run(folder, kFlat).err;
   };
