@@ -28,7 +28,10 @@ SHAPES = {  # name: (attributes here, attributes there)
     "box": ('type="cuboid" size="0.1 0.06 0.04"', 'type="box" size="0.05 0.03 0.02"'),
     "capsule": ('type="capsule" radius="0.03" length="0.1"', 'type="capsule" size="0.03 0.05"'),
     "cylinder": ('type="cylinder" radius="0.03" length="0.1"', 'type="cylinder" size="0.03 0.05"'),
-    "ellipsoid": ('type="ellipsoid" size="0.1 0.06 0.04"', 'type="ellipsoid" size="0.05 0.03 0.02"'),
+    "ellipsoid": (
+        'type="ellipsoid" size="0.1 0.06 0.04"',
+        'type="ellipsoid" size="0.05 0.03 0.02"',
+    ),
 }
 
 
