@@ -232,7 +232,7 @@ Written written_layout(Fitted fitted, const CalibrateArguments& a, const Calibra
   return {std::move(fitted.layout), error};
 }
 
-bool is_of_recording(const std::string& name) {
+bool is_recording_number(const std::string& name) {
   return std::ranges::count(kRecordingNumbers, name) > 0;
 }
 
@@ -240,7 +240,8 @@ bool is_of_recording(const std::string& name) {
 std::string beside_text(const Calibration& found) {
   std::vector<std::string> names;
   for (const FittedNumber& number : found.numbers)
-    if (is_of_recording(number.name) && number.name != kSliderForce) names.push_back(number.name);
+    if (is_recording_number(number.name) && number.name != kSliderForce)
+      names.push_back(number.name);
   return names.empty() ? "at all rows" : fmt::format("without {}", fmt::join(names, ", "));
 }
 
@@ -345,7 +346,7 @@ bool is_fitted(const Calibration& found, const char* name) {
 
 /// Whether numbers of the layout are fitted, if there are any. `usual`: without names.
 bool fits_layout(const CalibrateArguments& a, bool usual) {
-  return a.numbers.empty() ? usual : !std::ranges::all_of(a.numbers, is_of_recording);
+  return a.numbers.empty() ? usual : !std::ranges::all_of(a.numbers, is_recording_number);
 }
 
 /// " (mu: nothing is sheared, …)".

@@ -36,7 +36,7 @@ SHAPES = {  # name: (attributes here, attributes there)
 
 
 def camera_axes() -> str:
-    """The camera's x and y axes, as MuJoCo wants them."""
+    """The camera's x and y axes, the numbers of MuJoCo's xyaxes."""
     ahead = (LOOK - EYE) / np.linalg.norm(LOOK - EYE)
     x = np.cross(ahead, [0, 0, 1.0])
     x /= np.linalg.norm(x)

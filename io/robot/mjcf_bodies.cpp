@@ -425,16 +425,16 @@ class Bodies {
     const RobotNode& node = part.node;
     if (node.has("material")) {
       const auto& materials = part.file().materials;
-      const auto material = materials.find(node.text("material"));
-      if (material != materials.end())
-        piece.looks = material->second;
+      const auto named = materials.find(node.text("material"));
+      if (named != materials.end())
+        piece.material = named->second;
       else
         node.changed("<geom> of material '" + node.text("material") +
                      "': the usual grey, because no <material> has that name");
     }
     if (!node.has("rgba")) return;
     const std::vector<double> x = node.numbers("rgba", 4);
-    piece.looks.rgba = {x[0], x[1], x[2], x[3]};
+    piece.material.rgba = {x[0], x[1], x[2], x[3]};
   }
 
   /// Half sizes of a geom: `count` numbers, all positive.

@@ -148,7 +148,7 @@ class MjcfFile {
   bool align_free = false;  ///< free joints are aligned with the inertia of their bodies
   std::array<int, 2> inertia_groups{0, 5};
   std::map<std::string, MjcfMesh> meshes;
-  std::map<std::string, Looks> materials;
+  std::map<std::string, Material> materials;
   std::map<std::string, std::unique_ptr<MjcfFile>> models;  ///< that an <attach> may name
 
   [[nodiscard]] double angle(double x) const {

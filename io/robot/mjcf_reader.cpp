@@ -171,10 +171,10 @@ void read_mesh(MjcfFile& file, const RobotNode& node) {
 /// A material that gives neither specular nor shininess has no highlight here.
 void read_material(MjcfFile& file, const RobotNode& node) {
   constexpr double kUsual = 0.5;  // MuJoCo's own
-  Looks looks;
+  Material material;
   if (node.has("rgba")) {
     const std::vector<double> x = node.numbers("rgba", 4);
-    looks.rgba = {x[0], x[1], x[2], x[3]};
+    material.rgba = {x[0], x[1], x[2], x[3]};
   }
   const auto share = [&](const char* name, double usual) {
     const double given = node.number(name, usual), kept = std::clamp(given, 0.0, 1.0);
@@ -184,11 +184,11 @@ void read_material(MjcfFile& file, const RobotNode& node) {
     return kept;
   };
   if (node.has("specular") || node.has("shininess")) {
-    looks.specular = share("specular", kUsual);
-    looks.shininess = share("shininess", kUsual);
+    material.specular = share("specular", kUsual);
+    material.shininess = share("shininess", kUsual);
   }
-  looks.emission = share("emission", 0);
-  file.materials[node.text("name")] = looks;
+  material.emission = share("emission", 0);
+  file.materials[node.text("name")] = material;
 }
 
 void read_asset(MjcfFile& file, const RobotNode& section) {

@@ -143,11 +143,11 @@ int add_link(Robot& robot, RobotNames& names, const std::string& name, int paren
   robot.scene.links.push_back(link);
   for (std::size_t k = 0; k < pieces.size(); ++k) {
     const RobotPiece& piece = pieces[k];
-    BodyDescription body{name,          piece.shape,      piece.pose,
-                         piece.density, piece.looks.rgba, piece.source};
-    body.specular = piece.looks.specular;
-    body.shininess = piece.looks.shininess;
-    body.emission = piece.looks.emission;
+    BodyDescription body{name,          piece.shape,         piece.pose,
+                         piece.density, piece.material.rgba, piece.source};
+    body.specular = piece.material.specular;
+    body.shininess = piece.material.shininess;
+    body.emission = piece.material.emission;
     const bool only_mass = std::holds_alternative<AbstractShape>(piece.shape);
     if (k > 0) {
       body.name = names.free_name(name + (only_mass ? "_inertia" : "_shape"));

@@ -106,8 +106,8 @@ class RobotNames {
   std::set<std::string> names_;
 };
 
-/// How a piece looks in pictures: as BodyDescription has it.
-struct Looks {
+/// Colour and material of a piece in pictures, as in BodyDescription.
+struct Material {
   std::array<double, 4> rgba{0.7, 0.7, 0.7, 1};
   double specular = 0, shininess = 0.5, emission = 0;
 };
@@ -117,7 +117,7 @@ struct RobotPiece {
   Shape shape;
   Pose pose;
   double density = 0;  ///< [kg/m³]; 0: it has no mass of its own
-  Looks looks;
+  Material material;
   bool touches = true;  ///< false: it has a mass, and nothing touches it
   MeshFile mesh;        ///< of mesh shapes
   std::string origin;   ///< "<collision>", "<geom>"

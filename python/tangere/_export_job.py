@@ -34,7 +34,7 @@ from typing import Any, Callable, Collection, Iterator, Protocol
 
 from . import _core
 from ._export_pool import Pool
-from ._export_sums import Sums, joined, stored, sums_of
+from ._export_sums import Sums, joined, stored, file_sums
 
 Progress = Callable[[int, int], None]  # frames that are written, frames of this process
 
@@ -48,7 +48,7 @@ class Format(Protocol):
     parts: list[int]  #: frames of each
     names: list[str]  #: of its arrays
     fps: int  #: frames a second
-    by_folder: bool  #: whether its files are counted for each folder
+    folder_keys: bool  #: whether its files are counted for each folder
     common: list[str]  #: files that belong to no part, of those that have sums
 
     def job(self) -> dict[str, Any]:
@@ -109,7 +109,7 @@ class Work:
     def sums(self) -> Sums:
         """Of all files, after `Format.finish`."""
         parts = [self._stored(task) for task in self.tasks() if task.isdecimal()]
-        common = sums_of(self.folder, self.format.common, self.format.by_folder)
+        common = file_sums(self.folder, self.format.common, self.format.folder_keys)
         return joined([*(part["files"] for part in parts), common])
 
     def has_sums(self, task: str) -> bool:
@@ -127,8 +127,8 @@ class Work:
             (self.folder / name).unlink(missing_ok=True)
 
     def _found(self, task: str) -> dict[str, Sums]:
-        files = sums_of(self.folder, self.format.files(int(task)), self.format.by_folder)
-        return {"files": files, "beside": sums_of(self.folder, [f".parts/{task}.npz"], False)}
+        files = file_sums(self.folder, self.format.files(int(task)), self.format.folder_keys)
+        return {"files": files, "beside": file_sums(self.folder, [f".parts/{task}.npz"], False)}
 
     def _stored(self, task: str) -> dict[str, Sums]:
         """What `do` has stored of a part; nothing if that is missing or damaged."""
@@ -351,7 +351,7 @@ class Folder:
         ]
         new = self.part / ".parts/job.json.new"
         new.unlink(missing_ok=True)
-        write_json(new, {"job": self._name, "begun": sums_of(self.part, begun, False)})
+        write_json(new, {"job": self._name, "begun": file_sums(self.part, begun, False)})
         new.replace(self.part / ".parts/job.json")
 
     def _check_begun(self) -> None:
@@ -363,7 +363,7 @@ class Folder:
         self._check_foreign(begun)
         for name, (_, size, total) in begun.items():
             path = self.part / name
-            ((_, found, now),) = sums_of(self.part, [name], False).values() or ((0, 0, 0),)
+            ((_, found, now),) = file_sums(self.part, [name], False).values() or ((0, 0, 0),)
             ended = name == self._format.origin and _job_in(path) == self._name
             if (found, now) != (size, total) and not ended:
                 raise self._damaged(
@@ -428,7 +428,7 @@ class Folder:
 
 
 def _is_entry(value: Any) -> bool:
-    """Whether it is what `sums_of` has of a file."""
+    """Whether it is what `file_sums` has of a file."""
     return isinstance(value, list) and [type(number) for number in value] == [int] * 3
 
 

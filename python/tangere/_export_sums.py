@@ -22,15 +22,15 @@ Sums = dict[str, tuple[int, int, int]]  # path → files, bytes, sum
 _BLOCK = 1 << 20
 
 
-def sums_of(folder: Path, names: Iterable[str], by_folder: bool) -> Sums:
-    """Of files below `folder`; those that are not there are left out. `by_folder`: as folders, but
-    for files whose names begin with a dot."""
+def file_sums(folder: Path, names: Iterable[str], folder_keys: bool) -> Sums:
+    """Of files below `folder`; those that are not there are left out. `folder_keys`: as folders,
+    but for files whose names begin with a dot."""
     found: Sums = {}
     for name in names:
         path = folder / name
         if not path.is_file():
             continue
-        key = str(path.parent.relative_to(folder)) if by_folder and path.name[0] != "." else name
+        key = str(path.parent.relative_to(folder)) if folder_keys and path.name[0] != "." else name
         found = joined([found, {key: (1, path.stat().st_size, _sum(path))}])
     return found
 

@@ -50,7 +50,7 @@ class UniVtac:
     """
 
     kind, sign, origin = "UniVTAC data set", "metadata.json", "metadata.json"
-    by_folder, common = False, list[str]()
+    folder_keys, common = False, list[str]()
 
     def __init__(self, frames: Frames, joints: str | None = None, privileged: bool = False):
         episodes, self.frames = frames.episodes, frames

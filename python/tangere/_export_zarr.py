@@ -37,7 +37,7 @@ class ZarrStore:
     """What formats in Zarr share. They add `columns` and `arrays`."""
 
     kind, sign, origin = "Zarr data set", ".zgroup", ".zattrs"
-    by_folder = True
+    folder_keys = True
     fps: int
 
     def __init__(

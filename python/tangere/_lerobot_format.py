@@ -29,7 +29,7 @@ class LeRobot:
     """The format, with the options of `tangere.lerobot.export`."""
 
     kind, sign, origin = "LeRobot data set", "meta/info.json", "meta/tangere.json"
-    by_folder, common = False, [EPISODES, TASKS, "meta/stats.json"]
+    folder_keys, common = False, [EPISODES, TASKS, "meta/stats.json"]
 
     def __init__(
         self, frames: Frames, privileged: bool = False, touch: Touch | None = None,

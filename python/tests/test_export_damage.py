@@ -109,7 +109,7 @@ def test_the_command_refuses_it_with_code_3(damaged, command, tmp_path):
         assert not list(tmp_path.glob("out*"))
 
 
-def of_another_run(shard):
+def from_another_run(shard):
     with h5py.File(shard, "r+") as file:
         file["scene"].attrs["seed"] = type(file["scene"].attrs["seed"])(99)
 
@@ -120,7 +120,7 @@ def copy_of_the_first(shard):
 
 def test_shards_that_do_not_belong_together_are_refused(damaged, tmp_path):
     for change, message in (
-        (of_another_run, "' does not belong to the same run as '.*: seed: 99 there, 5 here"),
+        (from_another_run, "' does not belong to the same run as '.*: seed: 99 there, 5 here"),
         (copy_of_the_first, "shard-00001.h5' holds episodes 0 to 15; expected 16 to 31"),
     ):
         data = damaged(change)
