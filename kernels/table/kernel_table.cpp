@@ -39,11 +39,10 @@ void add_layer_kernels(KernelTable& k);
 
 namespace {
 
-/// Fills a table for the instruction set Arch, an xsimd tag or ScalarArch.
+/// Fills the table of the instruction set Arch, an xsimd tag or ScalarArch. The code that does so is
+/// compiled for that set as well, so only a processor that runs it may call this.
 template <class Arch>
-KernelTable table_of(const char* name) {
-  KernelTable k{};
-  k.name = name;
+void fill_table(KernelTable& k) {
   add_step_kernels<Lanes<Arch>, kGroup>(k.group);
   add_step_kernels<OneLane<Arch>, 1>(k.single);
   add_adjoint_kernels<Lanes<Arch>, kGroup>(k.group);
@@ -57,26 +56,31 @@ KernelTable table_of(const char* name) {
   add_shear_kernels<Arch>(k);
   add_block_kernels<Arch>(k);
   add_layer_kernels<Arch>(k);
-  return k;
 }
 
-/// The tables that were built. Best first.
-const KernelTable kBuilt[] = {
+struct BuiltSet {
+  const char* name;
+  void (*fill)(KernelTable& k);
+};
+
+/// The instruction sets that were built. Best first.
+constexpr BuiltSet kBuilt[] = {
 #if TANGERE_AVX512
-    table_of<xsimd::avx512bw>("avx512"),
+    {"avx512", &fill_table<xsimd::avx512bw>},
 #endif
 #if TANGERE_AVX2
-    table_of<xsimd::avx2>("avx2"),
+    {"avx2", &fill_table<xsimd::avx2>},
 #endif
 #if TANGERE_SSE2
-    table_of<xsimd::sse2>("sse2"),
+    {"sse2", &fill_table<xsimd::sse2>},
 #endif
 #if TANGERE_SCALAR
-    table_of<ScalarArch>("scalar"),
+    {"scalar", &fill_table<ScalarArch>},
 #endif
 };
 
 struct Registry {
+  std::array<KernelTable, std::size(kBuilt)> filled{};
   std::array<const KernelTable*, std::size(kBuilt)> tables{};
   std::size_t count = 0;
   const KernelTable* active = nullptr;
@@ -84,14 +88,17 @@ struct Registry {
 
   Registry() {
     std::string names, all_names;
-    for (const KernelTable& built : kBuilt) {
+    for (const BuiltSet& built : kBuilt) {
       all_names += (all_names.empty() ? "" : ", ") + std::string(built.name);
+      filled[count].name = built.name;
       if (!processor_runs(built.name)) continue;
-      tables[count++] = &built;
+      built.fill(filled[count]);
+      tables[count] = &filled[count];
+      ++count;
       names += (names.empty() ? "" : ", ") + std::string(built.name);
     }
     if (count == 0) {
-      active = &kBuilt[0];
+      active = &filled[0];  // without functions
       error = "this processor runs none of the instruction sets that this program was built for: " +
               all_names +
               "; expected a program that was built on this machine, or with -DTANGERE_ISAS=all";

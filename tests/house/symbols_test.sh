@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 # No function of the kernels may stand in the objects of two instruction sets: the linker keeps one
 # copy for all, and a machine without AVX-512 would meet the AVX-512 one. Nor may the number of
-# variants of the innermost kernels grow unnoticed. Takes the kernels' library.
+# variants of the innermost kernels grow unnoticed. Nor may a table be filled before main(): that
+# would run on machines without its instruction set. Takes the kernels' library.
 set -euo pipefail
 library=$1
 command -v nm >/dev/null || { echo "nm is not there: skipped"; exit 77; }
@@ -14,6 +15,10 @@ shared=$(nm -C "$library" | awk '
   END { for (name in count) if (count[name] > 1) print name }')
 isas=$(nm "$library" 2>/dev/null | sed -n 's/^kernels\.\([^.]*\)\..*:$/\1/p' | sort -u | tr '\n' ' ')
 [ -n "$isas" ] || { echo "no objects of kernels in $library"; exit 1; }
+if nm "$library" | grep -q '_GLOBAL__sub_I'; then
+  echo "static initialisers in $library, which run on machines without their instruction set"
+  exit 1
+fi
 # GCC 12 makes these of sums of products with alternating signs, whatever -ffp-contract says: other bits.
 if command -v objdump >/dev/null && objdump -d "$library" | grep -qE 'vfm(addsub|subadd)'; then
   echo "an instruction that fuses what the source does not: vfmaddsub or vfmsubadd"
