@@ -39,8 +39,8 @@ void add_layer_kernels(KernelTable& k);
 
 namespace {
 
-/// Fills the table of the instruction set Arch, an xsimd tag or ScalarArch. Its code is compiled for
-/// that set as well, so only a processor that runs the set may run it.
+/// Fills the table of the instruction set Arch, an xsimd tag or ScalarArch. Its code is compiled
+/// for that set as well, so only a processor that runs the set may run it.
 template <class Arch>
 void fill_table(KernelTable& k) {
   add_step_kernels<Lanes<Arch>, kGroup>(k.group);
