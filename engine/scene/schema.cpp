@@ -444,7 +444,7 @@ constexpr Attribute kSchema[] = {
     row(kCamera, "ambient", "0.35", U::one, "share of light from everywhere",
         &CameraDescription::ambient, Between{B::range, 0, 1}, F::ambient, Flags{kVaries}),
     row(kCamera, "brightness", "1", U::one, "factor of all light", &CameraDescription::brightness,
-        B::not_negative, F::brightness, Flags{kVaries}),
+        Between{B::range, 0, 1e6}, F::brightness, Flags{kVaries}),
     row(kCamera, "noise", "0", U::one, "deviation of every number in a step, grey levels",
         &CameraDescription::noise, B::not_negative),
     row(kCamera, "gain", "0", U::one, "deviation of a factor per channel and episode",

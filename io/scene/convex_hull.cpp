@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Quickhull on whole numbers. On a grid of 2^20 cells along the longest side, six times the volume
-// of a tetrahedron is an exact number of 64 bits. So whether a point is outside a face is never in
-// doubt, and the result is closed.
+// of a tetrahedron is an exact number of 64 bits. So tests for points outside a face are exact, and
+// the result is closed.
 #include "io/scene/convex_hull.hpp"
 
 #include <algorithm>

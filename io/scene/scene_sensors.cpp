@@ -225,6 +225,10 @@ PictureDescription read_picture(const SceneElement& node) {
   if (node.has("markers")) {
     const std::vector<double> counts = node.numbers("markers", 2);
     picture.markers = {int(counts[0]), int(counts[1])};
+  } else {
+    for (const char* const name : {"marker_pitch", "marker_radius"})
+      if (node.has(name))
+        node.fail(fmt::format("{} without markers; expected markers=\"COLUMNS ROWS\"", name));
   }
   const auto read = [&](const std::string& path) {
     return read_gel(path, node.context().outermost().warnings);

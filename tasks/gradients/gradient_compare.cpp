@@ -79,9 +79,9 @@ Difference best_difference(std::span<const double> values, double scale) {
   }
   Difference best{NAN, HUGE_VAL};
   for (std::size_t k = 2; k + 1 < kSweepLevels; ++k) {
-    const double doubt =
+    const double uncertainty =
         std::max(std::abs(slopes[k] - slopes[k - 1]), std::abs(slopes[k + 1] - slopes[k]));
-    if (doubt < best.doubt) best = {slopes[k], doubt};
+    if (uncertainty < best.uncertainty) best = {slopes[k], uncertainty};
   }
   return best;
 }
@@ -107,7 +107,7 @@ CheckedInput compare(const Comparison& of, double loss, const CheckOptions& o,
   c.influence = !(c.scale <= kNoInfluence * std::abs(loss));
   std::size_t worst = 0;
   for (std::size_t k = 0; k < entries.size() && c.influence; ++k) {
-    if (!(differences[k].doubt <= o.settled * c.scale)) {
+    if (!(differences[k].uncertainty <= o.settled * c.scale)) {
       if (++c.kinks <= kExplained) c.to_explain.push_back(entries[k]);
       continue;
     }

@@ -18,7 +18,7 @@ class RunTrace;
 
 /// The central difference at which three neighbouring step sizes agree best, and how well.
 struct Difference {
-  double value, doubt;
+  double value, uncertainty;
 };
 
 /// One input to compare.

@@ -169,8 +169,8 @@ TEST_P(JointConvergence, SchemesReachTheIndependentSolutionWithTheirOrder) {
   const Model model(c.scene());
   std::vector<double> u(std::size_t(model.nu()), 0.2);
   const Dense::Vector exact = reference(model.scene(), u, c.duration, 80);
-  const double doubt = double((exact - reference(model.scene(), u, c.duration, 100)).norm());
-  ASSERT_LT(doubt, 1e-11) << "the reference itself has not converged";
+  const double uncertainty = double((exact - reference(model.scene(), u, c.duration, 100)).norm());
+  ASSERT_LT(uncertainty, 1e-11) << "the reference itself has not converged";
   const struct {
     Integrator scheme;
     double order, slack;

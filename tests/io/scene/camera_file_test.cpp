@@ -158,6 +158,8 @@ TEST(CameraFile, MistakesAreErrorsWithTheirLine) {
   EXPECT_THAT(message(kPlace + " rows=\"4000\""), HasSubstr("rows=\"4000\""));
   EXPECT_THAT(message(kPlace + " fov=\"0\""), HasSubstr("fov=\"0\""));
   EXPECT_THAT(message(kPlace + " far=\"-1\""), HasSubstr("far=\"-1\""));
+  EXPECT_THAT(message(kPlace + " brightness=\"1e300\""),
+              HasSubstr("brightness=\"1e+300\"; expected a number from 0 to 1000000"));
   EXPECT_THAT(message(kPlace + " zoom=\"2\""), HasSubstr("zoom"));
   EXPECT_THAT(message("name=\"eye\" pos=\"0 0 1\""), HasSubstr("look"));
 }

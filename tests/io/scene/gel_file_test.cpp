@@ -142,6 +142,11 @@ TEST_F(GelFile, AScenesPictureHasItsAttributes) {
   EXPECT_EQ(read_scene(folder_ + "/scene.xml").scene.sensors[0].picture->gel->name, "default");
 }
 
+TEST_F(GelFile, SizesOfMarkersNeedMarkers) {
+  EXPECT_THAT(scene_error("<markers/><picture marker_pitch=\"3e-3\"/>"),
+              HasSubstr("<picture>: marker_pitch without markers; expected markers=\"COLUMNS ROWS"));
+}
+
 TEST_F(GelFile, NamesMayHoldWhatXmlUses) {
   const std::string name = "a & \"b\" <c>.png";
   put(name, png_bytes({1, 1, {1, 2, 3}}));
