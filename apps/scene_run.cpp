@@ -50,6 +50,7 @@ std::string split_text(const StepCounts& counts) {
   add("a body came through another", counts.tunnelled_steps);
   add("damped because they created energy", counts.damped_steps);
   add("bodies overlap", counts.overlapping_steps);
+  add("readings of layers that do not carry the loads of the contact", counts.loads_not_carried);
   return text;
 }
 
@@ -58,7 +59,8 @@ Json split_json(const StepCounts& counts) {
           {"accuracy_not_met_steps", counts.accuracy_not_met_steps},
           {"tunnelled_steps", counts.tunnelled_steps},
           {"damped_steps", counts.damped_steps},
-          {"overlapping_steps", counts.overlapping_steps}};
+          {"overlapping_steps", counts.overlapping_steps},
+          {"loads_not_carried", counts.loads_not_carried}};
 }
 
 Json steps_json(const std::optional<EpisodeSteps>& steps) {

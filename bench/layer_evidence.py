@@ -55,6 +55,7 @@ def gel(
     size: tuple[float, float],
     points: tuple[int, int],
     friction: str = 'mu="0" kt="0"',
+    contact: str = "",
 ) -> tangere.Scene:
     """Bodies that slide along z and touch a gel with their lowest points at q = 0."""
     rows, cols = points
@@ -70,6 +71,7 @@ def gel(
 <robot><link name="plate"><joint name="plate" type="fixed" pos="0 0 -0.005"/>
 <body name="plate" type="cuboid" size="{size[0]} {size[1]} 0.01" density="1000"/></link></robot>
 {links}
+<contact>{contact}</contact>
 <sensor><tactile name="gel" body="plate" type="rect_array" rect_pos0="{-x} {-y} 0.005"
  rect_pos1="{x} {y} 0.005" axis0="1 0 0" axis1="0 1 0" resolution="{rows} {cols}" {friction}
  {skin}</tactile></sensor></tangere>"""
@@ -78,10 +80,10 @@ def gel(
         return tangere.Scene.from_string(text)
 
 
-def layer(cell: float, margin: float, feedback: str = "false") -> str:
+def layer(cell: float, margin: float, feedback: str = "false", load: str = "depth") -> str:
     return (
         f'modulus="{E}" thickness="{THICKNESS}"><layer poisson="{NU}" cell="{cell}" '
-        f'margin="{margin}" feedback="{feedback}"/><markers/>'
+        f'margin="{margin}" feedback="{feedback}" load="{load}"/><markers/>'
     )
 
 
@@ -152,15 +154,17 @@ def forces() -> str:
 
 def readings() -> str:
     """The table of what a reading costs."""
-    lines = ["| pad | pressing points | layer | springs |", "|---|---|---|---|"]
+    lines = ["| pad | pressing points | layer | with `load` | springs |", "|---|---|---|---|---|"]
     rub, pads = 'mu="1" kt="0.01"', []
+    touch = f'<surface_contact body1="b0" body2="plate" kn="{SPRINGS}" kt="0" mu="0"/>'
     for points, cell, depths in (((24, 32), 0.75e-3, (0.35e-3, 0.7e-3, 1e-3)),
                                  ((48, 64), 0.75e-3, (0.35e-3, 0.7e-3, 1e-3))):  # fmt: skip
         for depth in depths:
             times, pressing = [], 0
             area = SIZE[0] * SIZE[1] / (points[0] * points[1])
-            for skin in (layer(cell, MARGIN), f'kn="{SPRINGS * area}">'):
-                model = tangere.Model(gel(BALL, skin, SIZE, points, rub))
+            for skin in (layer(cell, MARGIN), layer(cell, MARGIN, load="contact"),
+                         f'kn="{SPRINGS * area}">'):  # fmt: skip
+                model = tangere.Model(gel(BALL, skin, SIZE, points, rub, touch))
                 batch = tangere.Batch(model, 1, precision="double")
                 batch.set_state(np.full(model.nq, -depth), np.full(model.nv, 0.01))
                 pressing = pressing or int((batch.tactile("gel")[0][..., 2] > 0).sum())

@@ -28,8 +28,8 @@ void read_dual_layer(const CompiledModel& m, int sensor,
                      std::span<const kernels::LinkScratch<D>> links,
                      const Coefficients<D>& coefficients, const LayerMaterial& material_dot,
                      const double* column, std::span<const double> numbers,
-                     const DualSprings& springs, std::span<double> field,
-                     std::span<double> field_dot) {
+                     const DualSprings& springs, const std::array<D, 3>& loads,
+                     std::span<double> field, std::span<double> field_dot) {
   const CompiledSensor& s = m.sensors[std::size_t(sensor)];
   std::vector<double> whole(field_dot.size()), whole_dot(whole), normal(whole), normal_dot(whole);
   Coefficients<D> smooth = coefficients;
@@ -57,10 +57,11 @@ void read_dual_layer(const CompiledModel& m, int sensor,
   a.touches = touch_values.data();
   LayeredField layered;
   std::vector<double> own(whole.size());
-  layered.read(s, a, {whole, normal}, own);
+  layered.read(s, a, {whole, normal}, own, {loads[0].value, loads[1].value, loads[2].value});
   if (!field.empty()) std::copy(own.begin(), own.end(), field.begin());
   layered.push_forward({whole_dot, normal_dot}, touches, sizes, coefficients.kn.epsilon,
-                       material_dot, field_dot);
+                       material_dot, field_dot,
+                       {loads[0].epsilon, loads[1].epsilon, loads[2].epsilon});
 }
 
 }  // namespace tangere

@@ -13,12 +13,14 @@ namespace tangere {
 using DualSprings = std::function<void(const Coefficients<kernels::Dual<double>>& law, bool elastic,
                                        std::span<double> field, std::span<double> field_dot)>;
 
-/// Computes the outputs of DualStage::field().
+/// Computes the outputs of DualStage::field(). `loads`: those that a layer under load control
+/// carries.
 void read_dual_layer(const CompiledModel& m, int sensor,
                      std::span<const kernels::LinkScratch<kernels::Dual<double>>> links,
                      const Coefficients<kernels::Dual<double>>& coefficients,
                      const LayerMaterial& material_dot, const double* column,
                      std::span<const double> numbers, const DualSprings& springs,
-                     std::span<double> field, std::span<double> field_dot);
+                     const std::array<kernels::Dual<double>, 3>& loads, std::span<double> field,
+                     std::span<double> field_dot);
 
 }  // namespace tangere

@@ -8,12 +8,31 @@
 #include "engine/derivative/dual_field.hpp"
 #include "engine/derivative/dual_layer.hpp"
 #include "engine/derivative/dual_stage_impl.hpp"
+#include "engine/sense/contact_loads.hpp"
 
 namespace tangere {
 
 using kernels::kBlock;
 using kernels::Parameter;
 using D = DualNumber;
+
+namespace {
+
+/// The values of a pair's numbers, and the faces that count there.
+PairAt<double> pair_values(const kernels::PairContact& pair, const PairAt<D>& at) {
+  const auto value = [](const kernels::Vec3<D>& x) {
+    return kernels::Vec3<double>{x.x.value, x.y.value, x.z.value};
+  };
+  PairAt<double> out{};
+  for (int k = 0; k < 9; ++k)
+    out.link2_in_1.R.m[k / 3][k % 3] = at.link2_in_1.R.m[k / 3][k % 3].value;
+  out.link2_in_1.p = value(at.link2_in_1.p);
+  out.size = value(at.size);
+  choose_faces(pair, out);
+  return out;
+}
+
+}  // namespace
 
 DualStage::DualStage(const CompiledModel& model) : impl_(std::make_unique<Impl>(model)) {
   centre.resize(std::size_t(model.nq));
@@ -195,7 +214,43 @@ void DualStage::field(int sensor, const double* column, std::span<const double> 
   if (!points.empty())
     throw InputError("derivatives by points of a sensor with a layer or a table; expected springs");
   read_dual_layer(i.m, sensor, i.links, coefficients, i.material_tangent(sensor, numbers), column,
-                  numbers, springs, field, field_dot);
+                  numbers, springs, contact_loads(sensor), field, field_dot);
+}
+
+/// Loads of the contacts of a sensor whose layer carries them, at the poses of kinematics().
+std::array<D, 3> DualStage::contact_loads(int sensor) const {
+  const Impl& i = *impl_;
+  const CompiledSensor& skin = i.m.sensors[std::size_t(sensor)];
+  std::array<D, 3> sum{D(0.0), D(0.0), D(0.0)};
+  for (const int k : skin.contacts) {
+    kernels::PairContact pair = i.pairs[std::size_t(k)];
+    const double* const stretch = &i.stretch[std::size_t(kernels::kSizeNumbers * pair.body1)];
+    pair.ball_tangent = pair.ball_radius > 0 ? stretch[0] : 0;
+    const kernels::LinkPose<D> one = dual_pose(i.links, pair.link1),
+                               two = dual_pose(i.links, pair.link2);
+    PairAt<D> at;
+    at.link2_in_1 = relative(one.world, two.world);
+    at.twist = motion_to_parent(at.link2_in_1, two.V) - one.V;
+    at.law = kernels::load_law<D>(pair.parameters, pair.law, pair.ramp, i.block.data(), 0);
+    at.size = kernels::load_vector<D>(pair.size, pair.size_row, i.block.data(), 0);
+    const PairAt<double> values = pair_values(pair, at);
+    at.faces = values.faces;
+    std::vector<PairPoint<D>> points;
+    for (const int n : touching_points(pair, values)) {
+      const double* const p = pair.points + 3 * n;
+      const kernels::Vec3<double> moves = i.stretched(pair.body1, {p[0], p[1], p[2]});
+      points.push_back({{{p[0], moves.x}, {p[1], moves.y}, {p[2], moves.z}},
+                        kernels::zero3<D>(),
+                        pair.weights == nullptr ? 1 : pair.weights[n]});
+      if (pair.memory < 0) continue;
+      const int first = i.m.shear_springs[std::size_t(pair.memory)].first;
+      const D* const kept = &s_start[3 * std::size_t(first + n)];
+      points.back().stretched = {kept[0], kept[1], kept[2]};
+    }
+    const std::array<D, 3> own = loads_of_pair<D>(skin, pair, at, points);
+    for (std::size_t c = 0; c < 3; ++c) sum[c] += own[c];
+  }
+  return sum;
 }
 
 /// Field of a sensor with shear springs: the contact law at the state `centre` with twist r and its

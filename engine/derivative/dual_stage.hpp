@@ -3,6 +3,7 @@
 // every input. It is slow. It serves the tangents that the adjoint is checked against.
 #pragma once
 
+#include <array>
 #include <memory>
 #include <span>
 #include <vector>
@@ -66,6 +67,7 @@ class DualStage {
              std::span<const double> points, std::span<double> field, std::span<double> field_dot);
 
  private:
+  [[nodiscard]] std::array<DualNumber, 3> contact_loads(int sensor) const;
   void elastic_field(int sensor, const Coefficients<DualNumber>& law, std::span<double> field,
                      std::span<double> field_dot);
   struct Impl;

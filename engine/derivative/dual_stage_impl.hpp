@@ -7,8 +7,8 @@
 
 #include "engine/derivative/dual_layer_contacts.hpp"
 #include "engine/derivative/dual_stage.hpp"
-#include "engine/derivative/stretched_point.hpp"
 #include "engine/model/group_contacts.hpp"
+#include "engine/model/stretched_point.hpp"
 #include "engine/step/kept_anchors.hpp"
 #include "kernels/shear/update_shear_state.hpp"
 #include "kernels/step/link_poses.hpp"

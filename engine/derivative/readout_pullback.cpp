@@ -156,6 +156,11 @@ struct ReadoutPullback::Impl {
     layered.read(reader, elastic, *batch, kBlock * block + lane, s, !pressure, to);
   }
 
+  /// Adds to a row of `parameters`, if there are any.
+  static void add(int lane, int row, double x, std::span<double> parameters) {
+    if (!parameters.empty()) parameters[std::size_t(row * kBlock + lane)] += x;
+  }
+
   /// Pulls the cotangent of such a field back.
   void pull_back_layered(int lane, const CompiledSensor& s, bool pressure,
                          std::span<const double> cotangent, std::span<double> parameters,
@@ -169,19 +174,37 @@ struct ReadoutPullback::Impl {
     read_layered(s, lane, pressure, std::span(expanded).first(numbers));
     LayeredField::Cotangents& bar = layered.pull_back(layer_bar, !parameters.empty(),
                                                       std::span(touches).first(s.targets.size()));
-    const auto add = [&](int row, double x) {
-      if (!parameters.empty()) parameters[std::size_t(row * kBlock + lane)] += x;
-    };
-    add(compiled(model).view.rows.sensor(s.number), bar.stiffness);
+    add(lane, compiled(model).view.rows.sensor(s.number), bar.stiffness, parameters);
     if (!s.layer->table) {
       const int row = compiled(model).layer_row(s.number);
-      add(row, bar.material.thickness), add(row + 1, bar.material.poisson);
+      add(lane, row, bar.material.thickness, parameters);
+      add(lane, row + 1, bar.material.poisson, parameters);
     }
     add_touches(lane, s, parameters);
-    if (!pressure) pull_back_springs(lane, s, bar.whole, parameters);
-    for (std::size_t k = 0; pressure && k < numbers; ++k) bar.normal[k] += bar.whole[k];
+    if (s.layer->load_control) pull_back_loads(lane, parameters);
+    const bool rubs = !pressure || s.layer->load_control;  // loads count friction
+    if (rubs) pull_back_springs(lane, s, bar.whole, parameters);
+    for (std::size_t k = 0; !rubs && k < numbers; ++k) bar.normal[k] += bar.whole[k];
     gather(s, bar.normal);
     pull_back(lane, s.number, tiles, tile_values, parameters, {}, true);
+  }
+
+  /// Pulls the cotangent of the loads of the last layer back to its contacts.
+  void pull_back_loads(int lane, std::span<double> parameters) {
+    const kernels::ParameterRows& of = compiled(model).view.rows;
+    std::vector<double>& shear = memory[std::size_t(lane)];
+    shear.resize(3 * batch->shear_state(kBlock * block + lane).size());
+    for (const ContactLoads::Share& share : layered.pull_back_loads(!parameters.empty(), shear)) {
+      const kernels::PairContact& pair = compiled(model).pairs[std::size_t(share.pair)];
+      hand_on(share.motion, pair.link1, {kernels::diagonal(1.0), {0, 0, 0}}, pair.link2,
+              lane / kGroup, lane % kGroup);
+      for (int k = 0; k < kCoefficients; ++k)
+        add(lane, of.pair(share.pair) + k, share.motion.law[std::size_t(k)], parameters);
+      for (int k = 0; k < kernels::kSizeNumbers; ++k) {
+        add(lane, of.solid(pair.body1) + k, (&share.stretch.x)[k], parameters);
+        add(lane, of.solid(pair.body2) + k, (&share.motion.size.x)[k], parameters);
+      }
+    }
   }
 
   /// Pulls the cotangent of a picture of the bodies' depth back.
@@ -220,8 +243,7 @@ struct ReadoutPullback::Impl {
       hand_on(touches[k], s.link, s.pad, m.bodies[std::size_t(s.targets[k])].link, lane / kGroup,
               lane % kGroup);
       const int size = m.view.rows.solid(s.targets[k]);
-      for (int c = 0; c < 3 && !parameters.empty(); ++c)
-        parameters[std::size_t((size + c) * kBlock + lane)] += (&touches[k].size.x)[c];
+      for (int c = 0; c < 3; ++c) add(lane, size + c, (&touches[k].size.x)[c], parameters);
     }
   }
 
@@ -452,12 +474,11 @@ void ReadoutPullback::Impl::pull_back(int lane, int sensor, std::span<const int>
   for (std::size_t k = 0; k < s.targets.size(); ++k) {
     const kernels::TouchCotangent<double>& c = touches[k];
     hand_on(c, s.link, s.pad, m.bodies[std::size_t(s.targets[k])].link, group, in_group);
-    if (parameters.empty()) continue;
-    const auto add = [&](int at, double x) { parameters[std::size_t(at * kBlock + lane)] += x; };
     for (int n = 0; n < kCoefficients; ++n)
-      if (!pressure || n == kStiffness || n == kDamping) add(row + n, c.law[std::size_t(n)]);
+      if (!pressure || n == kStiffness || n == kDamping)
+        add(lane, row + n, c.law[std::size_t(n)], parameters);
     const int size = m.view.rows.solid(s.targets[k]);
-    add(size, c.size.x), add(size + 1, c.size.y), add(size + 2, c.size.z);
+    for (int n = 0; n < 3; ++n) add(lane, size + n, (&c.size.x)[n], parameters);
   }
 }
 

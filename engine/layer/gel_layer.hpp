@@ -26,7 +26,9 @@ namespace tangere {
 
 /// The depth of a point that nothing can press. Points that only the bulge of the gel may press
 /// have negative depths.
-inline double least_depth(const CompiledLayer& layer) { return layer.feedback ? -HUGE_VAL : 0; }
+inline double least_depth(const CompiledLayer& layer) {
+  return layer.feedback || layer.load_control ? -HUGE_VAL : 0;
+}
 
 /// Solves one sensor's layer at a time. Owns the scratch of one thread, which grows with the number
 /// of cells in contact. A solution begins with the points that pressed in the last one, and uses

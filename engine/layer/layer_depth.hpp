@@ -65,6 +65,25 @@ std::optional<double> find_underside(const Shape& shape, const kernels::Touch<do
   return depth;
 }
 
+/// Returns δ < 0 of a point outside of a convex shape that is above it by less than `reach`, else
+/// none. The distance is convex along the normal, so Newton's method rises to the underside.
+template <class Shape>
+std::optional<double> find_underside_above(const Shape& shape, const kernels::Touch<double>& t,
+                                           const kernels::Vec3<double>& xi, double outward,
+                                           double reach) {
+  double depth = 0;
+  for (int step = 0; step < 100; ++step) {
+    const kernels::Distance<double> found =
+        distance_in_pad(shape, t, {xi.x, xi.y, xi.z - outward * depth});
+    const double slope = -outward * found.n.z;
+    if (!(found.d < reach + depth && slope > 0)) return std::nullopt;
+    if (std::abs(found.d) <= kernels::kClose * reach) break;
+    depth = std::min(0.0, depth - found.d / slope);
+    if (!(depth > -reach)) return std::nullopt;
+  }
+  return depth;
+}
+
 /// δ₀ by the thickness.
 inline constexpr double kFading = 0.1;
 
@@ -89,17 +108,20 @@ N relaxation_at(const CompiledLayer& layer, const N& depth, const N& thickness) 
 }
 
 /// Finds δ of a point; none where the point is outside the shape, or farther than the bulge. The
-/// shapes of a contact are convex.
+/// shapes of a contact are convex. `above`: under load control, how far above the surface a convex
+/// shape may be [m].
 template <class Shape>
 std::optional<KnownDepth> find_depth(const Shape& shape, const kernels::Touch<double>& t,
-                                     const kernels::Vec3<double>& xi, const CompiledLayer& layer) {
+                                     const kernels::Vec3<double>& xi, const CompiledLayer& layer,
+                                     double above = 0) {
   if (layer.feedback) {
     const kernels::ContactDepth<double> found =
         contact_depth(shape, t, xi, contact_law(layer), kernels::down_in_shape(t, layer.outward));
     if (!(found.touches > 0)) return std::nullopt;
     return KnownDepth{found.known, static_cast<DepthBy>(found.by)};
   }
-  const auto found = find_underside(shape, t, xi, layer.outward, layer.deepest);
+  auto found = find_underside(shape, t, xi, layer.outward, layer.deepest);
+  if (!found && above > 0) found = find_underside_above(shape, t, xi, layer.outward, above);
   if (!found) return std::nullopt;
   return KnownDepth{*found, *found < layer.deepest ? DepthBy::underside : DepthBy::end};
 }

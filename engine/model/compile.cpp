@@ -386,7 +386,8 @@ class Compiler {
     return groups;
   }
 
-  /// Makes the layers of sensors the contacts of their points.
+  /// Makes the layers of sensors the contacts of their points, or finds the contacts whose loads
+  /// they carry.
   void layer_pads() {
     for (const CompiledSensor& sensor : m_.sensors) {
       if (!sensor.layer || !sensor.layer->feedback) continue;
@@ -398,6 +399,8 @@ class Compiler {
           m_.contact_info[k].law = "of the layer";
       m_.layer_pads.push_back({sensor.number, sensor.layer, sensor.pad, sensor_points_[name]});
     }
+    for (CompiledSensor& sensor : m_.sensors)
+      if (sensor.layer && sensor.layer->load_control) sensor.contacts = load_contacts(m_, sensor);
     number_layers(m_);
     for (kernels::PairContact& pair : m_.pairs) pair.extent += bulge_of(m_, pair);
   }

@@ -52,13 +52,14 @@ struct CompiledLayer {
   std::vector<CellWeights> weights;  ///< (points) row-major
   LayerCompliance compliance;
   SharedSlopes slopes;
-  double modulus = 0;     ///< E [Pa], of a table 1, where kn is `stiffness`; proportional to kn
-  double stiffness = 0;   ///< kn of the scene [N/m]
-  double relaxation = 0;  ///< τ [s]
-  double area = 0;        ///< for which a point stands [m²]
-  double deepest = 0;     ///< where depth ends [m]
-  bool feedback = false;  ///< the layer is the contact as well
-  int outward = 1;        ///< 1 or -1: whether the pad's z points out of the skin
+  double modulus = 0;         ///< E [Pa], of a table 1, where kn is `stiffness`; proportional to kn
+  double stiffness = 0;       ///< kn of the scene [N/m]
+  double relaxation = 0;      ///< τ [s]
+  double area = 0;            ///< for which a point stands [m²]
+  double deepest = 0;         ///< where depth ends [m]
+  bool feedback = false;      ///< the layer is the contact as well
+  bool load_control = false;  ///< it carries the loads of the contacts of CompiledSensor::contacts
+  int outward = 1;            ///< 1 or -1: whether the pad's z points out of the skin
   /// Of a contact: how far above the surface a body may be that the gel's bulge touches [m].
   [[nodiscard]] double bulge() const { return feedback ? 0.1 * grid.thickness : 0; }
   /// Returns how C(0) changes with the material [m], at E = 1 Pa.

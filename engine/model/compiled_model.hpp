@@ -99,6 +99,8 @@ struct CompiledSensor {
   /// one link share the layer. Else zeros.
   std::vector<int> target_groups;
   bool sizes_vary = false;  ///< some of their sizes vary
+  /// Of a layer under load control: pairs of the sensor's body with the targets.
+  std::vector<int> contacts;
   SensorImperfections imperfections{};
   bool imperfect = false;            ///< some imperfection is on
   int number = 0;                    ///< of the sensor in the scene

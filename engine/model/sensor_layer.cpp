@@ -128,6 +128,11 @@ std::shared_ptr<const CompiledLayer> compile_sensor_layer(const TactileDescripti
   layer->number = ++compiled_layers;
   layer->modulus = d.material->modulus;
   layer->feedback = d.layer->feedback;
+  layer->load_control = d.layer->load_control;
+  if (layer->feedback && layer->load_control)
+    fail(d,
+         "load=\"contact\" and feedback, whose loads are the contact's already; expected one of "
+         "them");
   layer->stiffness =
       d.coefficients.kn > 0 ? d.coefficients.kn : skin_springs(*d.material).kn * height * width;
   layer->relaxation = d.material->relaxation;
@@ -144,6 +149,26 @@ std::shared_ptr<const CompiledLayer> compile_sensor_layer(const TactileDescripti
     layer->surface.emplace(layer->grid);
   }
   return layer;
+}
+
+std::vector<int> load_contacts(const CompiledModel& m, const CompiledSensor& sensor) {
+  const TactileDescription& d = m.scene.sensors[std::size_t(sensor.number)];
+  std::vector<int> contacts;
+  for (const int target : sensor.targets) {
+    for (std::size_t k = 0; k < m.pairs.size(); ++k) {
+      const kernels::PairContact& pair = m.pairs[k];
+      if (!(pair.body1 == sensor.body && pair.body2 == target) &&
+          !(pair.body2 == sensor.body && pair.body1 == target))
+        continue;
+      if (pair.layer_pad >= 0)
+        fail(d, fmt::format("load=\"contact\", but '{}' and '{}' touch by the layer of another "
+                            "sensor, '{}'; expected springs",
+                            d.body, m.scene.links[std::size_t(target)].body.name,
+                            m.scene.pair_contacts[k].sensor));
+      contacts.push_back(static_cast<int>(k));
+    }
+  }
+  return contacts;
 }
 
 void check_layer_contacts(const CompiledModel& m, const CompiledSensor& sensor) {

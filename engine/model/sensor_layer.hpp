@@ -23,6 +23,10 @@ std::shared_ptr<const CompiledLayer> compile_sensor_layer(const TactileDescripti
                                                           const CompiledSensor& sensor,
                                                           int pressure_sign);
 
+/// Returns the pairs of a sensor's body with those that it senses, whose loads its layer carries.
+/// Throws InputError (file:line) for one by the layer of another sensor.
+std::vector<int> load_contacts(const CompiledModel& model, const CompiledSensor& sensor);
+
 /// Throws InputError (file:line) where a sensor's layer is the contact, but a sensed body has no
 /// contact with its points.
 void check_layer_contacts(const CompiledModel& model, const CompiledSensor& sensor);

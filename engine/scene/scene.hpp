@@ -254,6 +254,9 @@ struct LayerDescription {
   /// The layer is the contact of the sensor's points. It needs their contacts
   /// (engine/scene/sensor_contacts.hpp), which the scene reader adds.
   bool feedback = false;
+  /// The layer carries the loads of the contacts between the sensor's body and those that it
+  /// senses. A body without such a contact adds none. Not with feedback.
+  bool load_control = false;
 };
 
 /// Pressure of a skin that is no elastic layer, by its depth (docs/table.md).

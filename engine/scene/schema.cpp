@@ -371,6 +371,8 @@ constexpr Attribute kSchema[] = {
         &LayerDescription::margin, B::not_negative),
     row(kLayer, "feedback", "false", U::one, "true: the layer is the contact as well",
         Words{"false true"}, E::feedback),
+    row(kLayer, "load", "depth", U::one, "what the sum of the field follows from",
+        Words{"depth contact"}),
     row(kGelPicture, "gel", "", U::one, "file of the camera's gel; three lamps if left out"),
     row(kGelPicture, "rows", "240", U::one, "pixels from top to bottom", &PictureDescription::rows,
         Between{B::integer, 1, 2048}),

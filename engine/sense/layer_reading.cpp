@@ -19,13 +19,17 @@ void LayerReading::read(PadReader& reader, ElasticField& elastic, const Batch& b
   auto smooth = touched;
   without_friction(smooth, frictionless_);
   read_ideal(reader, sensor, smooth, normal_);
-  if (!friction)
+  const bool controlled = sensor.layer->load_control;
+  if (!friction && !controlled)
     whole_ = normal_;
   else if (sensor.elastic)
     elastic.read(reader, batch, environment, sensor.number, whole_);
   else
     read_ideal(reader, sensor, touched, whole_);
-  layered_.read(sensor, touched, {whole_, normal_}, field);
+  const PadLoads loads =
+      controlled ? contacts_.read(reader, batch, environment, sensor) : PadLoads{};
+  layered_.read(sensor, touched, {whole_, normal_, friction || !controlled}, field, loads);
+  if (controlled && !layered_.carries()) ++loads_not_carried_;
 }
 
 LayeredField::Cotangents& LayerReading::pull_back(

@@ -75,8 +75,9 @@ Vec3<double> LayeredField::to_pad(const Vec3<double>& b) const {
 }
 
 /// Lists a point that a shape of a group presses, with the deepest of its shapes. `normal`: N of
-/// the springs.
-void LayeredField::add_point(int index, int group, const Vec3<double>& xi, double normal) {
+/// the springs. `above`: how far above the surface a shape may be [m].
+void LayeredField::add_point(int index, int group, const Vec3<double>& xi, double normal,
+                             double above) {
   constexpr double kMostSlant = 10;  // 1/cos of 84°
   const CompiledLayer& layer = *sensor_->layer;
   Point best{index, group, -1, xi, {}, normal, {}};
@@ -87,11 +88,12 @@ void LayeredField::add_point(int index, int group, const Vec3<double>& xi, doubl
     kernels::with_distance<double>(
         s.shape, Vec3<double>{s.size[0], s.size[1], s.size[2]},
         [&](const auto& shape) {
-          const auto known = find_depth(shape, touches_[k], xi, layer);
+          const auto known =
+              find_depth(shape, touches_[k], xi, layer, s.grid == nullptr ? above : 0);
           if (!known) return;
           const LayerDepth<double> at =
               layer_depth(shape, touches_[k], xi, layer, *known, layer.grid.thickness);
-          const bool presses = at.depth > -layer.bulge() && std::isfinite(at.depth) &&
+          const bool presses = at.depth > -above && std::isfinite(at.depth) &&
                                dot(at.slant, at.slant) < kMostSlant * kMostSlant;
           if (presses && (best.target < 0 || at.depth > best.at.depth))
             best.target = static_cast<int>(k), best.known = *known, best.at = at;
@@ -134,7 +136,7 @@ void LayeredField::for_each_law(const F& f) {
   for (std::size_t g = 0; g < layers_.size(); ++g) f(layers_[g], g * count, count);
 }
 
-void LayeredField::find_points(const SpringFields& springs) {
+void LayeredField::find_points(const SpringFields& springs, double above) {
   points_.clear();
   depth_.assign(layers_.size() * static_cast<std::size_t>(sensor_->points()),
                 least_depth(*sensor_->layer));
@@ -142,7 +144,7 @@ void LayeredField::find_points(const SpringFields& springs) {
   for (int tile = 0; tile < pad_.tiles(); ++tile) {
     bool reached = false;
     for (std::size_t k = 0; k < shapes_.size() && !reached; ++k)
-      reached = reaches_tile(pad_, tile, shapes_[k], touches_[k], sensor_->layer->bulge());
+      reached = reaches_tile(pad_, tile, shapes_[k], touches_[k], above);
     if (!reached) continue;
     const double* const offset = pad_.offsets + 2 * kernels::kTactileTile * pad_.kind[tile];
     for_points_of_tile(pad_, tile, [&](int slot, int index) {
@@ -151,7 +153,7 @@ void LayeredField::find_points(const SpringFields& springs) {
         add_point(
             index, group,
             {pad_.x[tile] + offset[slot], pad_.y[tile] + offset[kernels::kTactileTile + slot], 0},
-            std::sqrt(dot(n, n)));
+            std::sqrt(dot(n, n)), above);
     });
   }
 }
@@ -165,8 +167,10 @@ LayeredField::Friction LayeredField::friction_at(const Point& p) const {
 }
 
 void LayeredField::read(const CompiledSensor& sensor, const kernels::TactileArgs<double>& touch,
-                        const SpringFields& springs, std::span<double> field) {
+                        const SpringFields& springs, std::span<double> field,
+                        const PadLoads& loads) {
   sensor_ = &sensor;
+  friction_ = springs.friction;
   pad_ = sensor.tiles();
   const CompiledLayer& layer = *sensor.layer;
   kn_ = touch.n_touches > 0 ? touch.touches[0].law.kn : 0;
@@ -177,20 +181,24 @@ void LayeredField::read(const CompiledSensor& sensor, const kernels::TactileArgs
   int groups = 1;
   for (const int g : sensor.target_groups) groups = std::max(groups, g + 1);
   layers_.resize(static_cast<std::size_t>(groups));
-  find_points(springs);
   const double modulus = layer.modulus * (kn_ / layer.stiffness);
-  for_each_law([&](auto& law, std::size_t first, std::size_t count) {
-    law.solve(layer, std::span(depth_).subspan(first, count), modulus);
-  });
+  if (layer.load_control) {
+    solve_loads(springs, loads, modulus);
+  } else {
+    find_points(springs, layer.bulge());
+    for_each_law([&](auto& law, std::size_t first, std::size_t count) {
+      law.solve(layer, std::span(depth_).subspan(first, count), modulus);
+    });
+  }
   std::fill(field.begin(), field.end(), 0.0);
   for (const Point& p : points_) {
     const double load = layer.area * pressure(p);
     Vec3<double> f = load * in_field(p.at.slant);
-    if (p.normal > 0) f += (friction_load(p) / p.normal) * friction_at(p).along;
+    if (p.normal > 0 && friction_) f += (friction_load(p) / p.normal) * friction_at(p).along;
     add_force(field, p.index, f);
   }
   // A state that is not finite is one in the springs' field.
-  bool solved = true;
+  bool solved = !layer.load_control || control_.solved();
   for (const GelLayer& one : layers_) solved = solved && (layer.table || one.solved());
   for (std::size_t k = 0; k < field.size(); ++k)
     if (!solved || !std::isfinite(whole_[k])) field[k] = std::numeric_limits<double>::quiet_NaN();
@@ -219,13 +227,20 @@ void LayeredField::pull_back(std::span<const double> field_bar, bool numbers, Co
   load_bar_.assign(depth_.size(), 0.0);
   depth_bar_.resize(depth_.size());
   slant_bar_.clear(), held_bar_.clear();
-  for (const Point& p : points_) {
+  if (layer.load_control) find_lambda(field_bar);
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    const Point& p = points_[i];
     held_bar_.push_back(0);
     const double load = layer.area * pressure(p);
-    const Vec3<double> bar = vector_at(field_bar, p.index);
+    Vec3<double> bar = vector_at(field_bar, p.index), carried = {0, 0, 0};
+    if (layer.load_control) {
+      carried = control_.along(lambda_, loaded_[i]) * pressing_direction();
+      bar = bar - carried;
+    }
     double load_bar = dot(bar, in_field(p.at.slant));
     Vec3<double> slant_bar = load * to_pad(bar);
     if (p.normal > 0) {
+      if (!friction_) bar = -carried;
       const Friction f = friction_at(p);
       const double held = friction_load(p), share = held / p.normal,
                    along = dot(bar, f.along) / p.normal, out_of_plane = dot(f.normal, bar),
@@ -255,10 +270,13 @@ void LayeredField::pull_back(std::span<const double> field_bar, bool numbers, Co
   });
   for (std::size_t i = 0; i < points_.size(); ++i) depth_bar_[place(points_[i])] += held_bar_[i];
   for (kernels::TouchCotangent<double>& t : out.touches) t = {};
-  for (std::size_t i = 0; i < points_.size(); ++i)
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    if (layer.load_control && !has_cotangent(points_[i])) continue;
     if (points_[i].known.by != DepthBy::end)
       pull_back_point(points_[i], slant_bar_[i], numbers, out);
+  }
   out.material = {};
+  out.loads = layer.load_control ? control_.loads_bar(lambda_) : PadLoads{};
   if (numbers && !layer.table && !layer.surface) pull_back_material(out);
 }
 
@@ -285,6 +303,8 @@ void LayeredField::pull_back_material(Cotangents& out) const {
     out.material.thickness += own_bar * slopes.thickness.own;
     out.material.poisson += own_bar * slopes.poisson.own;
   }
+  if (sensor_->layer->load_control)
+    out.material.thickness += control_.thickness_bar(approach_bar());
 }
 
 /// Adds the cotangents of the motion and of the size of the shape at a point.
@@ -315,7 +335,8 @@ void LayeredField::pull_back_point(const Point& p, const Vec3<double>& slant_bar
 
 void LayeredField::push_forward(const SpringFields& springs_dot, std::span<const Touch<D>> touches,
                                 std::span<const Vec3<D>> sizes, double stiffness_dot,
-                                const LayerMaterial& material_dot, std::span<double> field_dot) {
+                                const LayerMaterial& material_dot, std::span<double> field_dot,
+                                const PadLoads& loads_dot) {
   const CompiledLayer& layer = *sensor_->layer;
   std::vector<Vec3<double>> slants_dot;
   std::vector<double> depth_dot(depth_.size()), pressure_dot(depth_.size());
@@ -365,6 +386,85 @@ void LayeredField::push_forward(const SpringFields& springs_dot, std::span<const
       f += (held_dot * inverse + held * inverse_dot) * now.along + (held * inverse) * along_dot;
     }
     add_force(field_dot, p.index, f);
+  }
+  if (layer.load_control) add_approach(loads_dot, material_dot, field_dot);
+}
+
+// --- load control ---
+
+/// The component of a field that is its pressing force.
+Vec3<double> LayeredField::pressing_direction() const {
+  const double third = pad_.skewed ? pad_.axes[8] : -1;
+  return {0, 0, -sensor_->layer->outward / third};
+}
+
+/// The pressing force of a point by its load.
+double LayeredField::pressing_share(const Point& p) const {
+  if (!(p.normal > 0)) return 1;
+  return 1 + dot(pressing_direction(), friction_at(p).along) / p.normal;
+}
+
+/// Whether the cotangents of depth and slant of a point may be other numbers than zero.
+bool LayeredField::has_cotangent(const Point& p) const {
+  return pressure(p) > 0 || depth_bar_[place(p)] != 0;
+}
+
+void LayeredField::solve_loads(const SpringFields& springs, const PadLoads& loads, double modulus) {
+  control_.solve(
+      *sensor_->layer, modulus, loads,
+      [&](double above) -> std::span<const LoadControl::Point> {
+        find_points(springs, above);
+        loaded_.clear();
+        for (const Point& p : points_)
+          loaded_.push_back({p.index, p.at.depth, p.xi.x, p.xi.y, pressing_share(p)});
+        return loaded_;
+      },
+      layers_[0]);
+}
+
+/// Returns the cotangent of shift and tilts from that of the depths.
+std::array<double, 3> LayeredField::approach_bar() const {
+  std::array<double, 3> sum{};
+  for (std::size_t i = 0; i < points_.size(); ++i)
+    for (std::size_t k = 0; k < 3; ++k) {
+      std::array<double, 3> unit{};
+      unit[k] = 1;
+      sum[k] += depth_bar_[place(points_[i])] * control_.along(unit, loaded_[i]);
+    }
+  return sum;
+}
+
+/// Sets λ from the cotangent of the field at constant loads.
+void LayeredField::find_lambda(std::span<const double> field_bar) {
+  const CompiledLayer& layer = *sensor_->layer;
+  for (const Point& p : points_) {
+    const Vec3<double> bar = vector_at(field_bar, p.index);
+    double load_bar = dot(bar, in_field(p.at.slant));
+    if (p.normal > 0 && friction_) load_bar += dot(bar, friction_at(p).along) / p.normal;
+    load_bar_[place(p)] = layer.area * load_bar;
+  }
+  layers_[0].pull_back(load_bar_, depth_bar_);
+  lambda_ = control_.pull_back(approach_bar());
+}
+
+/// Adds what the change of shift and tilts changes.
+void LayeredField::add_approach(const PadLoads& loads_dot, const LayerMaterial& material_dot,
+                                std::span<double> field_dot) {
+  PadLoads carried{};
+  for (const Point& p : points_) {
+    const double force = dot(pressing_direction(), vector_at(field_dot, p.index));
+    carried[0] += force, carried[1] += force * p.xi.x, carried[2] += force * p.xi.y;
+  }
+  const std::array<double, 3> change =
+      control_.push_forward(loads_dot, carried, material_dot.thickness);
+  std::vector<double> depth_dot(depth_.size()), pressure_dot(depth_.size());
+  for (std::size_t i = 0; i < points_.size(); ++i)
+    depth_dot[place(points_[i])] = control_.along(change, loaded_[i]);
+  layers_[0].push_forward(depth_dot, {}, pressure_dot);
+  for (const Point& p : points_) {
+    Vec3<double> f = in_field(p.at.slant);
+    if (p.normal > 0) f += (1 / p.normal) * friction_at(p).along;
+    add_force(field_dot, p.index, (sensor_->layer->area * pressure_dot[place(p)]) * f);
   }
 }
 

@@ -18,6 +18,7 @@ Readout::~Readout() = default;
 Readout::Readout(Readout&&) noexcept = default;
 Readout& Readout::operator=(Readout&&) noexcept = default;
 Precision Readout::precision() const { return impl_->precision; }
+std::int64_t Readout::loads_not_carried() const { return impl_->layered.loads_not_carried(); }
 
 void Readout::bodies(const Batch& batch, int environment, std::span<double> pose,
                      std::span<double> twist, std::span<const int> chosen) {

@@ -35,6 +35,9 @@ class Readout {
   Readout& operator=(Readout&&) noexcept;
 
   [[nodiscard]] Precision precision() const;
+  /// How many readings so far were of a layer under load control that does not carry the loads of
+  /// its contacts: the body is beside the pad, or the tilt is at its end (docs/layer.md).
+  [[nodiscard]] std::int64_t loads_not_carried() const;
 
   /// Reads world poses (nb, 7: x y z qw qx qy qz of the body frame) and twists (nb, 6: angular,
   /// then linear velocity of the body frame's origin, world axes) of one environment, for every

@@ -295,6 +295,7 @@ void read_parts(const SceneNode& node, TactileDescription& sensor) {
       element.read(sensor.layer.emplace());
       sensor.layer->source = part.source();
       sensor.layer->feedback = element.word("feedback") == 1;
+      sensor.layer->load_control = element.word("load") == 1;
     } else if (shows) {
       sensor.picture = read_picture(element);
       check_gel_size(element, sensor);
@@ -380,6 +381,21 @@ void add_layer_feedback(Scene& scene, const SceneElement& node, TactileDescripti
   add_sensor_contacts(scene, d);
 }
 
+/// Refuses a layer that carries the loads of contacts that there are not.
+void check_load_contacts(const Scene& scene, const TactileDescription& d) {
+  for (const int other : sensed_bodies(scene, d)) {
+    const std::string& name = scene.links[std::size_t(other)].body.name;
+    if (std::ranges::none_of(scene.pair_contacts, [&](const PairContactDescription& c) {
+          return (c.general_body == d.body && c.primitive_body == name) ||
+                 (c.general_body == name && c.primitive_body == d.body);
+        }))
+      throw InputError(fmt::format(
+          "{}<layer> of '{}': load=\"contact\", but no contact of '{}' with '{}', which it senses; "
+          "expected <surface_contact> or <general_primitive_contact> of both, or ignores=\"{}\"",
+          d.layer->source.prefix(), d.name, d.body, name, name));
+  }
+}
+
 /// Reads names between commas; blanks beside a comma do not count.
 std::vector<std::string> body_names(const SceneNode& node, const char* attribute) {
   std::vector<std::string> names =
@@ -446,6 +462,8 @@ void read_sensors(Scene& scene, const SceneNode& section) {
       add_feedback(scene, node, d);
     scene.sensors.push_back(std::move(d));
   }
+  for (const TactileDescription& d : scene.sensors)
+    if (d.layer && d.layer->load_control) check_load_contacts(scene, d);
 }
 
 void read_outputs(Scene& scene, const SceneNode& section) {

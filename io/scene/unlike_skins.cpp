@@ -137,7 +137,7 @@ void warn_of_unlike_skins(const Scene& scene, const SceneNode& root) {
   Densities estimates;
   for (const TactileDescription& d : scene.sensors) {
     const double sensed = d.coefficients.kn * points_of_sensor(d);
-    if (!(sensed > 0)) continue;
+    if (!(sensed > 0) || (d.layer && d.layer->load_control)) continue;
     for (const PairContactDescription& c : scene.pair_contacts)
       if (const std::string text = unlike(scene, d, sensed, c, estimates); !text.empty()) {
         root.context().warnings.push_back(text);

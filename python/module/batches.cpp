@@ -536,9 +536,11 @@ void add_batches(nb::module_& m) {
       .def_prop_ro("num_envs", &PythonBatch::environments, "E")
       .def_prop_ro("threads", &PythonBatch::threads)
       .def_prop_ro("seed", &PythonBatch::seed)
-      .def_prop_ro("status", &PythonBatch::status, nb::rv_policy::automatic,
-                   "(E) int8, values of StepStatus: how the last step of each environment ended;\n"
-                   "negative where it has failed and stands still.")
+      .def_prop_ro("loads_not_carried", &PythonBatch::loads_not_carried,
+                   "Readings so far of layers that cannot carry the loads of their contacts.")
+      .def_prop_ro(
+          "status", &PythonBatch::status, nb::rv_policy::automatic,
+          "(E) int8, StepStatus of the last step; negative where it has failed and stands still.")
       .def("end_effectors", &PythonBatch::end_effectors, "(E, n, 3) places in the world [m].")
       .def(
           "transmission_forces", &PythonBatch::transmission_forces, "u"_a,

@@ -73,6 +73,11 @@ class PythonBatch {
   [[nodiscard]] int environments() const { return batch_.environments(); }
   [[nodiscard]] int threads() const { return static_cast<int>(workers_.size()); }
   [[nodiscard]] std::uint64_t seed() const { return batch_.seed(); }
+  [[nodiscard]] std::int64_t loads_not_carried() const {
+    std::int64_t sum = 0;
+    for (const Worker& worker : workers_) sum += worker.readout.loads_not_carried();
+    return sum;
+  }
 
  private:
   struct Waiting;

@@ -54,6 +54,7 @@ void EpisodeSlot<T>::begin(EpisodeRange range) {
   program_ = source_.program(*batch_);
   program_->start(*batch_, 0);
   tally_.emplace(*batch_, 0, episodes);
+  loads_before_ = readout_.loads_not_carried();
   next_row_ = 0;
   if (program_->opening_steps() == 0)
     for (std::size_t name = 0; name < windows_.size(); ++name)
@@ -332,6 +333,7 @@ void EpisodeSlot<T>::add_to(EpisodeSummary& run) const {
   const VectorCounts counts = program_->counts(*tally_);
   run.environment_steps += counts.environment_steps;
   run.counts += counts.steps;
+  run.counts.loads_not_carried += readout_.loads_not_carried() - loads_before_;
   run.failures.insert(run.failures.end(), failures_.begin(), failures_.end());
   auto failure = failures_.begin();
   for (int e = 0; e < batch_->environments(); ++e) {

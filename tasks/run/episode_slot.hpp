@@ -67,6 +67,7 @@ class EpisodeSlot {
   bool windowed_;  // whether something is read within rows
   Stepper stepper_;
   Readout readout_;
+  std::int64_t loads_before_ = 0;  // not carried, of the readout in earlier blocks
   std::optional<Batch> batch_;
   std::unique_ptr<EpisodeProgram> program_;
   std::optional<StepTally> tally_;

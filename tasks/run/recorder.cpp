@@ -544,6 +544,12 @@ void Recorder::write(When when, std::int64_t t) {
   }
 }
 
+std::int64_t Recorder::loads_not_carried() const {
+  std::int64_t sum = 0;
+  for (const Readout& readout : readouts_) sum += readout.loads_not_carried();
+  return sum;
+}
+
 std::optional<EnergyBalanceSummary> Recorder::audit() const {
   if (!audit_) return {};
   return audit_->summary();

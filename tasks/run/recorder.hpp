@@ -49,6 +49,8 @@ class Recorder {
   void write(When when, std::int64_t t);
 
   [[nodiscard]] std::optional<EnergyBalanceSummary> audit() const;
+  /// As Readout::loads_not_carried(), of all that was recorded.
+  [[nodiscard]] std::int64_t loads_not_carried() const;
 
  private:
   using Read = std::function<Numbers(std::int64_t t, int part)>;

@@ -102,6 +102,7 @@ RolloutSummary run_rollout(Batch& batch, std::span<Stepper> steppers, EpisodePro
     if (summary.stopped) break;
   }
   summary.counts = tally.counts;
+  summary.counts.loads_not_carried = recorder.loads_not_carried();
   summary.audit = recorder.audit();
   summary.failures = std::move(tally.failures);
   summary.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

@@ -19,6 +19,8 @@ struct StepCounts {
   std::int64_t damped_steps = 0;            ///< that would have created energy
   std::int64_t overlapping_steps = 0;       ///< after which bodies of a contact overlap unnoticed
   std::int64_t bodies_asleep = 0;           ///< summed over simulation_steps
+  /// Readings of layers that do not carry the loads of their contacts, where a run has readings.
+  std::int64_t loads_not_carried = 0;
 
   /// Counts the step that an environment has just taken.
   void count(const Batch& batch, int environment) {
@@ -45,6 +47,7 @@ struct StepCounts {
     damped_steps += other.damped_steps;
     overlapping_steps += other.overlapping_steps;
     bodies_asleep += other.bodies_asleep;
+    loads_not_carried += other.loads_not_carried;
     return *this;
   }
 };
