@@ -39,6 +39,22 @@ def test_environments_have_gels_of_their_own():
     assert len(np.unique(field[..., 2].max((1, 2)))) == 3  # kn is drawn, and E follows it
 
 
+def test_loads_of_the_contact_do_not_follow_the_gel():
+    text = Path(GEL).read_text()
+    old = '<layer cell="0.75e-3" margin="1e-3"/>'
+    assert old in text
+    text = text.replace(old, old.replace("/>", ' load="contact"/>'))
+    batch = tangere.Batch(tangere.Model(tangere.Scene.from_string(text)), 3, 1, precision="double")
+    for _ in range(60):
+        batch.step(np.array([0, 0, -0.0015]))
+    field = batch.tactile("gel")[..., 2]
+    total = field.sum((1, 2))
+    assert total[0] > 1
+    np.testing.assert_allclose(total, total[0], rtol=1e-12)  # of one motion
+    assert len(np.unique(field.max((1, 2)))) == 3  # kn is drawn, and E follows it
+    assert batch.loads_not_carried == 0
+
+
 @pytest.mark.parametrize("table", [False, True])
 def test_gradients_agree_with_differences(table, tmp_path):
     scene = with_table(tmp_path) if table else GEL

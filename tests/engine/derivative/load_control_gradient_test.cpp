@@ -25,27 +25,27 @@ struct LoadGradientCase {
 };
 void PrintTo(const LoadGradientCase& c, std::ostream* out) { *out << c.name; }
 
-LoadScene small(LoadScene s) {
+LoadScene small_pad(LoadScene s) {
   s.n = 12;
   return s;
 }
 
-const LoadGradientCase kCases[] = {
-    {"a ball that slides", small({})},
+const LoadGradientCase kLoadGradientCases[] = {
+    {"a ball that slides", small_pad({})},
     {"a ball that sticks",
-     small({.contact = R"(<surface_contact body1="ball" body2="table" kn="4e7" kt="2e4" mu="0.9"
+     small_pad({.contact = R"(<surface_contact body1="ball" body2="table" kn="4e7" kt="2e4" mu="0.9"
  damping="1e8" ks="2e7"/>)",
-            .skin = R"(mu="0.7")"})},
+                .skin = R"(mu="0.7")"})},
     {"a ball by its centre, on a gel that relaxes",
-     small({.contact = R"(<general_primitive_contact general_body="ball" primitive_body="table"
+     small_pad({.contact = R"(<general_primitive_contact general_body="ball" primitive_body="table"
  kn="1500" kt="20" mu="0.5" damping="20"/>)",
-            .skin = R"(mu="0.7" ks="0" kt="4e5" relaxation="2e-3")"})},
+                .skin = R"(mu="0.7" ks="0" kt="4e5" relaxation="2e-3")"})},
     {"a capsule",
-     small({.body = R"(type="capsule" length="0.01" radius="0.0149")",
-            .contact = R"(<surface_contact body1="table" body2="ball" kn="4e7" kt="2e4" mu="0.5"
+     small_pad({.body = R"(type="capsule" length="0.01" radius="0.0149")",
+                .contact = R"(<surface_contact body1="table" body2="ball" kn="4e7" kt="2e4" mu="0.5"
  damping="1e8" ks="1e7"/>)"})},
     {"a tilt at its end",
-     small(
+     small_pad(
          {.body = R"(type="sphere" radius="0.019")",
           .contact = R"(<surface_contact body1="table" body2="ball" kn="4e7" kt="2e4" mu="0.5"/>)",
           .start = "0.0045 0.001 0.0186"}),
@@ -116,11 +116,11 @@ TEST_P(LoadControlGradient, AdjointTangentAndDifferencesAgree) {
   EXPECT_GT(compared, 20);
 }
 
-INSTANTIATE_TEST_SUITE_P(Contacts, LoadControlGradient, ::testing::ValuesIn(kCases));
+INSTANTIATE_TEST_SUITE_P(Contacts, LoadControlGradient, ::testing::ValuesIn(kLoadGradientCases));
 
 /// Of a pressure, which leaves friction out but whose shift and tilts do not.
 TEST(LoadControlGradient, PressuresMatchDifferences) {
-  const Model model(testing::parsed(gel_on_a_hinge(small({}))));
+  const Model model(testing::parsed(gel_on_a_hinge(small_pad({}))));
   Batch batch(model, 1);
   const RunInput in = load_input(model);
   const std::size_t points = std::size_t(model.sensors()[0].points), nv = in.v.size();

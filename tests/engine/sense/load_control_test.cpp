@@ -23,7 +23,7 @@ using testing::LoadScene;
 using testing::parsed;
 using Numbers = std::vector<double>;
 
-constexpr double kWide = 6.6e-3;  // half of a pad's side, or less [m]
+constexpr double kHalfPad = 6.6e-3;  // half of a pad's side, or less [m]
 
 void expect_loads(const Batch& batch, const std::string& what, double pitch = 0.6e-3,
                   int sensor = 0) {
@@ -34,7 +34,7 @@ void expect_loads(const Batch& batch, const std::string& what, double pitch = 0.
   ASSERT_GT(wanted[0], 1e-3) << what;
   EXPECT_NEAR(found[0], wanted[0], 1e-12 * wanted[0]) << what;
   for (const std::size_t k : {1, 2})
-    EXPECT_NEAR(found[k], wanted[k], 1e-12 * kWide * wanted[0]) << what << " " << k;
+    EXPECT_NEAR(found[k], wanted[k], 1e-12 * kHalfPad * wanted[0]) << what << " " << k;
 }
 
 struct LoadCase {
@@ -43,7 +43,7 @@ struct LoadCase {
 };
 void PrintTo(const LoadCase& c, std::ostream* out) { *out << c.name; }
 
-constexpr const char* kSecond = R"(<robot><link name="pill">
+constexpr const char* kPill = R"(<robot><link name="pill">
 <joint name="pill" type="free3d" pos="-0.004 -0.003 0.0049"/>
 <body name="pill" type="capsule" length="0.004" radius="0.005" density="3000"/>
 </link></robot>)";
@@ -53,6 +53,7 @@ const LoadCase kLoadCases[] = {
      {.contact = R"(<surface_contact body1="table" body2="ball" kn="4e7" kt="0" mu="0"/>)",
       .skin = R"(mu="0" ks="0" kt="0")"}},
     {"a ball that slides", {}},
+    {"a table that is fixed", {.hinge = R"(type="fixed")"}},
     {"a ball that sticks",
      {.contact = R"(<surface_contact body1="ball" body2="table" kn="4e7" kt="2e4" mu="0.9"
  damping="1e8" ks="2e7"/>)",
@@ -69,7 +70,7 @@ const LoadCase kLoadCases[] = {
       .contact = R"(<surface_contact body1="table" body2="ball" kn="4e7" kt="2e4" mu="0.5"/>
 <surface_contact body1="table" body2="pill" kn="3e7" kt="2e4" mu="0.5" ks="1e7"/>)",
       .skin = R"(mu="0.7" ks="0" kt="4e5")",
-      .more = kSecond,
+      .more = kPill,
       .start = "0.003 0.002 0.0058"}}};
 
 class LoadControlCases : public ::testing::TestWithParam<LoadCase> {};
@@ -161,7 +162,7 @@ TEST(LoadControl, WhatNoPointCanCarryIsCounted) {
   const Model model(parsed(gel_on_a_hinge(s)));
   Batch batch(model, 1);
   const std::array<double, 3> wanted = loads_by_kernels(batch);
-  EXPECT_GT(wanted[1] / wanted[0], kWide) << "the centre of pressure is beside the pad";
+  EXPECT_GT(wanted[1] / wanted[0], kHalfPad) << "the centre of pressure is beside the pad";
   Readout readout(model);
   Numbers field(std::size_t(3 * model.sensors()[0].points));
   EXPECT_EQ(readout.loads_not_carried(), 0);
@@ -169,8 +170,8 @@ TEST(LoadControl, WhatNoPointCanCarryIsCounted) {
   EXPECT_EQ(readout.loads_not_carried(), 1);
   const std::array<double, 3> found = loads_in_field(model, field);
   EXPECT_NEAR(found[0], wanted[0], 1e-12 * wanted[0]);
-  EXPECT_GT(found[1] / found[0], 0.5 * kWide);
-  EXPECT_LT(found[1] / found[0], kWide);
+  EXPECT_GT(found[1] / found[0], 0.5 * kHalfPad);
+  EXPECT_LT(found[1] / found[0], kHalfPad);
   // Where no point is below the body, nothing presses.
   s.start = "0.017 0 0.0195", s.body = R"(type="cuboid" size="0.008 0.008 0.0392")";
   const Model beside(parsed(gel_on_a_hinge(s)));
