@@ -40,7 +40,7 @@ struct CalibrateArguments {
   std::optional<int> table;
   std::optional<double> hold_out, pixel;
   std::vector<double> nodes;
-  double zero = 0;
+  double zero = 0, depth_error = NAN;  // not a number: not given
   bool score = false, friction = false, overwrite = false;
 };
 
@@ -80,8 +80,13 @@ void check_arguments(const CalibrateArguments& a) {
            {{"--fit", !a.numbers.empty()},
             {"--table", a.table.has_value()},
             {"--hold-out", a.hold_out.has_value()},
+            {"--depth-error", !std::isnan(a.depth_error)},
             {"--output", !a.output.empty()}},
            "--score alone, which fits and writes nothing");
+  if (a.depth_error < 0)
+    throw InputError(fmt::format(
+        "--depth-error {}; expected the standard deviation of errors of depths [m], or 0 for none",
+        a.depth_error));
   check_indenter(a);
 }
 
@@ -92,6 +97,7 @@ int run_channels(const CalibrateArguments& a, const Console& console) {
           {"--table", a.table.has_value()},
           {"--score", a.score},
           {"--friction", a.friction},
+          {"--depth-error", !std::isnan(a.depth_error)},
           {"--column", !a.columns.empty()},
           {"--fit", !a.numbers.empty()}},
          "a fit of the skin's numbers of its own, before");
@@ -295,6 +301,7 @@ void check_for_pictures(const CalibrateArguments& a) {
                                     {"--table", a.table.has_value()},
                                     {"--score", a.score},
                                     {"--friction", a.friction},
+                                    {"--depth-error", !std::isnan(a.depth_error)},
                                     {"--column", !a.columns.empty()},
                                     {"--fit", !a.numbers.empty()},
                                     {"--hold-out", a.hold_out.has_value()},
@@ -388,20 +395,22 @@ int run_calibrate(const CalibrateArguments& a, const Console& console) {
   check_output(a, fitted);
   if (fitted.has_table && !a.score)
     console.note(a.sensor + ": its table of pressures stays; --table N fits another");
-  const CalibrationRequest request{.scene =
-                                       [&](const SkinNumbers& numbers) {
-                                         Fitted trial = fitted;
-                                         set_numbers(numbers, 17, trial);
-                                         return press_scene(trial.layout, a.indenter);
-                                       },
-                                   .start = fitted.start,
-                                   .knots = fitted.knots,
-                                   .numbers = a.numbers,
-                                   .fit = !a.score && !fitted.has_table,
-                                   .friction = a.friction,
-                                   .hold_out = a.hold_out.value_or(0)};
-  std::vector<std::string> warnings =
-      press_warnings(press_scene(fitted.own_layout, a.indenter), recording);
+  const CalibrationRequest request{
+      .scene =
+          [&](const SkinNumbers& numbers) {
+            Fitted trial = fitted;
+            set_numbers(numbers, 17, trial);
+            return press_scene(trial.layout, a.indenter);
+          },
+      .start = fitted.start,
+      .knots = fitted.knots,
+      .numbers = a.numbers,
+      .fit = !a.score && !fitted.has_table,
+      .friction = a.friction,
+      .depth_error = std::isnan(a.depth_error) ? std::nullopt : std::optional(a.depth_error),
+      .hold_out = a.hold_out.value_or(0)};
+  const Scene own = press_scene(fitted.own_layout, a.indenter);
+  std::vector<std::string> warnings = press_warnings(own, recording);
   warn(warnings, 0, a.recording, console);
   const Calibration found = calibrate(request, recording);
   Written written = written_layout(fitted, a, found, recording);
@@ -416,9 +425,11 @@ int run_calibrate(const CalibrateArguments& a, const Console& console) {
                            .warnings = {}};
   const std::size_t said = warnings.size();
   const Scene skin = press_scene(written.layout, a.indenter);
-  std::ranges::copy(skin_warnings(skin, recording), std::back_inserter(warnings));
+  std::ranges::copy(skin_warnings(skin, own, recording), std::back_inserter(warnings));
   if (is_fitted(found, kRelaxation) || is_fitted(found, kShear) || is_fitted(found, kFriction))
-    std::ranges::copy(rate_warnings(skin, recording), std::back_inserter(warnings));
+    std::ranges::copy(
+        rate_warnings(skin, recording, !std::isnan(a.depth_error) || found.depth_error.estimated),
+        std::back_inserter(warnings));
   if (const std::string misfit = misfit_text(found); !misfit.empty()) warnings.push_back(misfit);
   if (const std::string level = level_text(skin); fitted.knots > 0 && !level.empty())
     warnings.push_back(level);
@@ -496,8 +507,14 @@ Command add_calibrate(CLI::App& program) {
       "none; of --channels 0.2]");
   add_text(app, "--check", a.check, "OTHER.csv",
            "Another recording, whose normal forces or channels are compared with those of the fit");
-  add_flag(app, "--friction", a.friction,
-           "Compute the normal force with the layout's friction: mu, ks and kt");
+  add_flag(
+      app, "--friction", a.friction,
+      "Compute the normal force of a press with the layout's friction: mu, ks and kt; that of a "
+      "shear has it");
+  add_number(
+      app, "--depth-error", a.depth_error,
+      "Standard deviation of the errors of recorded depths [m], which intervals then contain; "
+      "0: none [default: estimated where the recording tells it]");
   add_flag(app, "--score", a.score,
            "Fit nothing: compare the layout as it is. So is one with a table, without --table");
   add_overwrite_option(app, a.overwrite);

@@ -85,8 +85,16 @@ std::string zeros_text(const Calibration& found) {
 
 std::string turns_text(const Calibration& found) {
   if (found.turns.empty()) return "";
-  return fmt::format("not fitted: {} row{} at which the rate of the depth jumps\n",
-                     found.turns.size(), found.turns.size() == 1 ? "" : "s");
+  return fmt::format("not fitted: {} row{} at which the rate of the depth{} jumps\n",
+                     found.turns.size(), found.turns.size() == 1 ? "" : "s",
+                     found.shear.rows > 0 ? " or of the shear" : "");
+}
+
+std::string depth_error_text(const DepthErrorFound& error) {
+  if (!(error.deviation > 0)) return "";
+  return fmt::format("errors of the depth: {:.2g} m{}, contained in the fit and in the intervals\n",
+                     error.deviation,
+                     error.estimated ? ", by the scatter of depths and forces" : "");
 }
 
 /// "friction: mu = 0.6 would add 4 % of the peak at most and move modulus by -5 %, …".
@@ -142,7 +150,8 @@ std::string report_text(const CalibrationReport& report) {
   for (const UntoldNumber& n : found.untold)
     text += fmt::format("not told: {}: {}\n", label_of(n.name, report), n.reason);
   for (const GivenNumber& n : found.given) text += given_text(n, report);
-  text += zeros_text(found) + turns_text(found) + friction_text(report);
+  text += zeros_text(found) + depth_error_text(found.depth_error) + turns_text(found) +
+          friction_text(report);
   if (!found.converged) text += "the fit has not come to an end\n";
   text.pop_back();
   return text;
@@ -178,6 +187,8 @@ void report_json(const CalibrationReport& report, const Console& console) {
        {"zero_correlation", correlation ? Json(*correlation) : Json()},
        {"rows_above", found.rows_above},
        {"turns", found.turns},
+       {"depth_error",
+        {{"deviation", found.depth_error.deviation}, {"estimated", found.depth_error.estimated}}},
        {"friction",
         {{"mu", found.friction.mu}, {"largest", found.friction.largest}, {"moved", moved}}},
        {"held_out", found.held_out},

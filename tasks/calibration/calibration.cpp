@@ -1,17 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
-// Two fits, of the normal and then of the shear force. A slider beside the skin has at the depths
-// d > 0 of a path the force s' = clamp(s + k (d' - d), ±F), and 0 outside.
+// The normal force is fitted without friction, then the shear force, and from there both together.
 #include "tasks/calibration/calibration.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <functional>
+#include <memory>
 #include <tuple>
 
 #include "engine/base/error.hpp"
+#include "tasks/calibration/depth_errors.hpp"
+#include "tasks/calibration/press_error.hpp"
 #include "tasks/calibration/press_warnings.hpp"
 
 namespace tangere {
@@ -24,93 +26,13 @@ struct SlipStart {
   double friction, stiffness;
 };
 constexpr SlipStart kSlipStarts[] = {{0.9, 3}, {1.2, 1.5}, {1.6, 1.2}, {2.2, 1.1}, {4, 1.02}};
-constexpr int kFrictionPasses = 5;    // each is a twentieth to a tenth as far off
-constexpr double kUnlike = 0.3;       // correlation of forces that have one sign
-constexpr double kSliderStart = 0.1;  // of the peak
-constexpr double kSmallest = 0.05;    // of the peak: smaller forces have no error of their own
+constexpr int kFrictionPasses = 5;  // each is a twentieth to a tenth as far off
+constexpr int kWeightPasses = 2, kErrorPasses = 4;
+constexpr double kMostWeight = 30, kLittleWeight = 1.4;  // of forces along the skin
+constexpr double kUnlike = 0.3;                          // correlation of forces that have one sign
+constexpr double kSliderStart = 0.1;                     // of the peak
 
 const std::string kDepth = "table_depth";
-
-double number_or(const SkinNumbers& numbers, const std::string& name, double otherwise) {
-  const auto at = numbers.find(name);
-  return at == numbers.end() ? otherwise : at->second;
-}
-
-double peak_of(std::span<const double> force) {
-  double peak = 0;
-  for (const double f : force) peak = std::max(peak, std::abs(f));
-  return peak;
-}
-
-/// `width`: numbers of a row.
-PressError error_of(std::span<const double> computed, std::span<const double> recorded,
-                    std::span<const int> rows, std::size_t width) {
-  PressError out;
-  const double peak = peak_of(recorded);
-  double recorded_squares = 0;
-  for (const int row : rows) {
-    double own = 0, squares = 0, off_squares = 0;
-    for (std::size_t k = width * std::size_t(row); k < width * (std::size_t(row) + 1); ++k) {
-      const double f = recorded[k], off = std::abs(computed[k] - f);
-      own = std::max(own, std::abs(f));
-      squares += f * f, off_squares += off * off;
-      out.largest = std::max(out.largest, off / peak);
-    }
-    out.root_mean_square += off_squares, recorded_squares += squares;
-    if (own > kSmallest * peak)
-      out.largest_by_row = std::max(out.largest_by_row, std::sqrt(off_squares / squares));
-  }
-  out.rows = int(rows.size());
-  if (recorded_squares > 0) out.relative = std::sqrt(out.root_mean_square / recorded_squares);
-  if (out.rows > 0)
-    out.root_mean_square =
-        std::sqrt(out.root_mean_square / (double(out.rows) * double(width))) / peak;
-  return out;
-}
-
-/// Numbers of a row of the normal and of the tangential forces.
-std::size_t normal_width(const PressRecording& r) { return std::max<std::size_t>(r.points, 1); }
-std::size_t shear_width(const PressRecording& r) { return std::max<std::size_t>(2 * r.points, 1); }
-
-void check_columns(const PressRecording& r) {
-  const bool fields = r.points > 0;
-  for (const auto& [name, column, width] :
-       {std::tuple{"force", &r.force, std::size_t{1}},
-        {"time", &r.time, 1},
-        {"shear", &r.shear, 1},
-        {"shear force", &r.shear_force, 1},
-        {"x", &r.x, 1},
-        {"y", &r.y, 1},
-        {"the field", &r.field, r.points},
-        {"the field along the skin", &r.shear_field, 2 * r.points}}) {
-    const bool needed = column == (fields ? &r.field : &r.force);
-    if (column->size() != width * r.rows() && (!column->empty() || needed))
-      throw InputError(fmt::format("a recording of {} depths and {} numbers of {}; expected {}",
-                                   r.rows(), column->size(), name,
-                                   width == 1 ? "as many" : "as many for each point"));
-  }
-}
-
-void check(const PressRecording& r) {
-  if (r.rows() == 0) throw InputError("a recording without depths; expected one row at least");
-  check_columns(r);
-  if (r.points == 0 && r.shear.empty() != r.shear_force.empty())
-    throw InputError("shear without its force, or the force without it; expected both or none");
-  if (r.points == 0 && !(r.x.empty() && r.y.empty()))
-    throw InputError("x or y without a field; expected a press in the middle of the skin");
-  if (!r.shear.empty() && !(r.x.empty() && r.y.empty()))
-    throw InputError("x or y beside a shear; expected presses at places, or a path");
-  for (std::size_t k = 1; k < r.time.size(); ++k)
-    if (!(r.time[k] > r.time[k - 1]))
-      throw InputError(fmt::format("row {}: time {} s after {} s; expected ascending times", k + 1,
-                                   r.time[k], r.time[k - 1]));
-  if (!(peak_of(r.normal()) > 0))
-    throw InputError("a recording without any force; expected a press of the skin");
-}
-
-bool varies(std::span<const double> column) {
-  return std::ranges::adjacent_find(column, std::ranges::not_equal_to()) != column.end();
-}
 
 /// Why the columns cannot tell a number; "" if they may.
 std::string reason_against(const std::string& name, const PressRecording& r, std::size_t rows) {
@@ -177,78 +99,6 @@ Names choose_numbers(const CalibrationRequest& request, const PressRecording& re
   return out;
 }
 
-/// The depths that act at the rows: those of `lag` earlier, and nearer by the zero.
-std::vector<double> acting_depths(const PressRecording& r, const SkinNumbers& numbers) {
-  const double lag = number_or(numbers, kLag, 0), zero = number_or(numbers, kZero, 0);
-  std::vector<double> out = r.depth;
-  for (std::size_t row = 0; row < r.rows() && r.rows() > 1 && lag > 0; ++row) {
-    const double then = std::max(r.time[row] - lag, r.time[0]);
-    const auto after = std::upper_bound(r.time.begin() + 1, r.time.end() - 1, then);
-    const auto k = std::size_t(after - r.time.begin());
-    out[row] = r.depth[k - 1] +
-               (r.depth[k] - r.depth[k - 1]) * (then - r.time[k - 1]) / (r.time[k] - r.time[k - 1]);
-  }
-  for (double& d : out) d += zero;
-  return out;
-}
-
-/// The rows of a recording as they act, with the numbers of the recording.
-class Acting {
- public:
-  Acting(const PressRecording& r, const SkinNumbers& numbers)
-      : time_(r.time), depth_(acting_depths(r, numbers)), fields_(r.points > 0) {
-    PressRecording moved;
-    moved.time = r.time, moved.depth = depth_;
-    rate_ = moved.rates();
-    const double dx = number_or(numbers, kPlaceX, 0), dy = number_or(numbers, kPlaceY, 0);
-    x_ = r.shear.empty() ? r.x : r.shear, y_ = r.y;
-    if (dx != 0) x_.resize(r.rows());
-    if (dy != 0) y_.resize(r.rows());
-    for (double& x : x_) x += dx;
-    for (double& y : y_) y += dy;
-  }
-
-  /// Of presses without friction. A sum does not depend on where the indenter went by shear.
-  [[nodiscard]] PressPath normal() const {
-    PressPath path = whole();
-    if (!fields_) path.x = path.y = {};
-    return path;
-  }
-  [[nodiscard]] PressPath whole() const {
-    return {.depth = depth_, .rate = rate_, .time = time_, .x = x_, .y = y_, .fields = fields_};
-  }
-  [[nodiscard]] std::span<const double> depth() const { return depth_; }
-
- private:
-  std::vector<double> time_, depth_, rate_, x_, y_;
-  bool fields_;
-};
-
-/// Adds the slider, if there is one. The indenter does not pull.
-void add_slider(std::span<const double> depth, const SkinNumbers& numbers,
-                std::vector<double>& force) {
-  const double stiffness = number_or(numbers, kSlider, 0);
-  if (stiffness == 0) return;
-  const double most = numbers.at(kSliderForce);
-  double s = 0;
-  for (std::size_t k = 0; k < depth.size(); ++k) {
-    const double before = std::max(depth[k > 0 ? k - 1 : 0], 0.0);
-    s = depth[k] > 0 ? std::clamp(s + stiffness * (depth[k] - before), -most, most) : 0;
-    force[k] = std::max(force[k] + s, 0.0);
-  }
-}
-
-std::vector<double> normal_forces(const CalibrationRequest& request, const PressRecording& r,
-                                  const SkinNumbers& numbers) {
-  const Acting acting(r, numbers);
-  std::vector<double> force = press_forces(request.scene(numbers), acting.normal());
-  add_slider(acting.depth(), numbers, force);
-  const double offset = number_or(numbers, kForceZero, 0);
-  if (offset != 0)
-    for (double& f : force) f += offset;
-  return force;
-}
-
 /// Returns the factor of the computed forces that fits best; not finite where all are 0.
 double best_factor(std::span<const double> computed, std::span<const double> recorded) {
   double both = 0, square = 0;
@@ -271,7 +121,7 @@ void scale_start(const CalibrationRequest& request, const PressRecording& r, dou
   if (request.knots > 0) straight[kDepth] = depth;
   for (const char* const name : {"modulus", "kn"})
     if (start.contains(name)) straight[name] = start[name];
-  const double factor = best_factor(normal_forces(request, r, straight), r.normal());
+  const double factor = best_factor(normal_forces(request.scene, r, straight), r.normal());
   if (const std::string reason = why_no_touch(request.scene(straight), depth);
       !std::isfinite(factor) && !reason.empty())
     throw InputError("the sensor feels nothing at any depth of the recording: " + reason +
@@ -292,37 +142,11 @@ void scale_start(const CalibrationRequest& request, const PressRecording& r, dou
   if (!r.time.empty()) start[kLag] = (r.time.back() - r.time.front()) / double(r.rows());
 }
 
-/// The whole forces at each row: along the normal, and the size of that along the skin.
-struct RowSums {
-  std::vector<double> normal, tangential;
-};
-RowSums row_sums(std::span<const double> normal, std::span<const double> tangential,
-                 std::size_t points) {
-  RowSums out;
-  const std::size_t width = std::max<std::size_t>(points, 1), rows = normal.size() / width;
-  for (std::size_t row = 0; row < rows; ++row) {
-    double sum = 0, a = 0, b = 0;
-    for (std::size_t k = row * width; k < (row + 1) * width; ++k) {
-      sum += normal[k];
-      if (points == 0)
-        a += tangential[k];
-      else
-        a += tangential[2 * k], b += tangential[2 * k + 1];
-    }
-    out.normal.push_back(sum), out.tangential.push_back(std::hypot(a, b));
-  }
-  return out;
-}
-
 /// Chooses a friction that some row exceeds and a spring that reaches it, because the fit does not
-/// move a friction at which nothing slips.
+/// move a friction at which nothing slips. `ratio`: the largest of shear to normal force.
 void scale_shear_start(const Forces& shear, const std::vector<std::string>& names,
-                       const SkinNumbers& fixed, const RowSums& sums,
-                       std::span<const double> recorded, const SlipStart& slip,
-                       SkinNumbers& start) {
-  double ratio = 0;
-  for (std::size_t k = 0; k < sums.normal.size(); ++k)
-    if (sums.normal[k] > 0) ratio = std::max(ratio, sums.tangential[k] / sums.normal[k]);
+                       const SkinNumbers& fixed, double ratio, std::span<const double> recorded,
+                       const SlipStart& slip, SkinNumbers& start) {
   if (!(ratio > 0)) return;
   if (std::ranges::count(names, kShear) > 0) {
     SkinNumbers stuck = fixed;
@@ -352,64 +176,48 @@ void check_shear_sign(const Forces& shear, const SkinNumbers& numbers,
                     alike));
 }
 
-/// Returns what friction adds at all rows; empty if the sensor has none, or if rows are at several
-/// places.
-std::vector<double> friction_forces(const CalibrationRequest& request, const PressRecording& r,
-                                    const SkinNumbers& numbers) {
+/// Whether a recording is of a shear, with forces along the skin.
+bool is_sheared(const PressRecording& r) { return varies(r.shear) && !r.tangential().empty(); }
+
+/// Whether normal forces are computed with the friction of the sensor: if the request says so, and
+/// of a shear, where presses are in one place and the sensor has friction.
+bool has_friction(const CalibrationRequest& request, const PressRecording& r,
+                  const SkinNumbers& numbers) {
   const Scene scene = request.scene(numbers);
   const ContactCoefficients& c = scene.sensors.at(0).coefficients;
-  const bool sheared = varies(r.shear), placed = varies(r.x) || varies(r.y);
-  if (!(c.mu > 0) || !(c.ks > 0) || placed || (sheared && request.friction)) {
-    if (!request.friction) return {};
+  const bool placed = varies(r.x) || varies(r.y), can = c.mu > 0 && c.ks > 0 && !placed;
+  if (request.friction && !can)
     throw InputError(fmt::format(
-        "a fit with friction, of {} with mu = {} and ks = {}; expected presses in one place, "
-        "without shear, and mu and ks above 0",
-        sheared  ? "a shear"
-        : placed ? "presses at several places"
-                 : "a sensor",
-        c.mu, c.ks));
-  }
-  try {
-    const Acting acting(r, numbers);
-    return friction_shares(scene, acting.whole());
-  } catch (const InputError&) {  // a step of the path failed: nothing is known
-    if (request.friction) throw;
-    return {};
-  }
+        "a fit with friction, of {} with mu = {} and ks = {}; expected presses in one place, and "
+        "mu and ks above 0",
+        placed ? "presses at several places" : "a sensor", c.mu, c.ks));
+  return can;
 }
 
-/// Computes the forces with all that the request has.
+/// Computes the normal forces with all that the request has.
 std::vector<double> all_forces(const CalibrationRequest& request, const PressRecording& r,
                                const SkinNumbers& numbers) {
-  std::vector<double> out = normal_forces(request, r, numbers);
-  if (!request.friction) return out;
-  const std::vector<double> more = friction_forces(request, r, numbers);
-  for (std::size_t k = 0; k < out.size(); ++k) out[k] += more[k];
-  return out;
+  if ((request.friction || is_sheared(r)) && has_friction(request, r, numbers))
+    return sheared_forces(request.scene, r, numbers).normal;
+  return normal_forces(request.scene, r, numbers);
 }
 
 /// Finds what friction does, or would do where the fit is without it.
 FrictionShare friction_share(const CalibrationRequest& request, const PressRecording& r,
-                             const ForceFit& along, const SkinNumbers& found) {
+                             const ForceFit& fit, const SkinNumbers& found) {
   FrictionShare out;
   const bool pressures = r.points > 0 && r.shear_field.empty();  // alone: without friction
-  if (pressures && !request.friction) return out;
-  const std::vector<double> share = friction_forces(request, r, found);
-  if (share.empty()) return out;
+  if ((pressures && !request.friction) || !has_friction(request, r, found)) return out;
+  std::vector<double> share;
+  try {
+    share = friction_added(request.scene, r, found);
+  } catch (const InputError&) {  // a step of the path failed: nothing is known
+    return out;
+  }
   out.mu = request.scene(found).sensors.at(0).coefficients.mu;
   out.largest = peak_of(share) / peak_of(r.normal());
-  if (!request.friction) out.moved = along.moves(share);
+  if (!request.friction && !is_sheared(r)) out.moved = fit.moves(share);
   return out;
-}
-
-/// Returns the largest ratio of shear to normal force, of rows whose normal force counts.
-double largest_ratio(const PressRecording& r) {
-  const RowSums sums = row_sums(r.normal(), r.tangential(), r.points);
-  const double least = kSmallest * peak_of(sums.normal);
-  double ratio = 0;
-  for (std::size_t k = 0; k < r.rows(); ++k)
-    if (sums.normal[k] > least) ratio = std::max(ratio, sums.tangential[k] / sums.normal[k]);
-  return ratio;
 }
 
 /// Finds what the zeros that are not fitted do. Those that nothing tells widen the intervals,
@@ -428,7 +236,6 @@ void add_fit(const ForceFit& fit, Calibration& out) {
   out.found = fit.found();
   out.converged = out.converged && fit.converged();
   for (const FittedNumber& number : fit.numbers()) out.numbers.push_back(number);
-  out.untold.insert(out.untold.end(), fit.untold().begin(), fit.untold().end());
 }
 
 /// Refuses a table of more numbers than forces. Of others the confidence says what is not told.
@@ -443,51 +250,250 @@ void check_table_rows(const CalibrationRequest& request, const Names& names, std
                                  width > 1 ? "force" : "row"));
 }
 
-/// What the fit of a shear follows.
-struct ShearFit {
+/// What is fitted, and to what.
+struct Problem {
   const CalibrationRequest& request;
   const PressRecording& recording;
-  const std::vector<std::string>& names;
-  const SkinNumbers& start;
-  const std::vector<double>& normal;  ///< forces that were computed
-  const ForceFit& along;              ///< fit of the normal forces
-  std::function<SkinNumbers(SkinNumbers)> full;
+  const Names& names;
+  const std::vector<int>& rows;
+  SkinNumbers start;
+  double depth;  ///< the largest [m]
+
+  /// Adds what follows from other numbers.
+  [[nodiscard]] SkinNumbers full(SkinNumbers numbers) const {
+    if (request.knots > 0) numbers[kDepth] = table_depth(depth, numbers);
+    return numbers;
+  }
+  [[nodiscard]] FitRows normal_rows() const {
+    return {.rows = rows, .width = normal_width(recording), .alike = recording.points > 0};
+  }
 };
 
-/// Fits ks and mu from several starts, of which the best end counts.
-void fit_shear(const ShearFit& of, Calibration& out) {
+/// A fit that can be repeated with errors of the depth.
+struct FitTask {
+  ShiftedForces forces;
+  std::vector<double> recorded;
+  FitRows rows;
+  std::vector<std::string> names, held;
+  FitStart start;
+  SkinNumbers fixed;
+
+  [[nodiscard]] std::vector<double> unmoved(const SkinNumbers& numbers) const {
+    return forces(numbers, std::array{DepthShift{}})[0];
+  }
+  /// Fits without errors of the depth. The fit refers to this task.
+  [[nodiscard]] ForceFit fit(const Problem& of) const {
+    const auto plain = [this](const SkinNumbers& numbers) { return unmoved(numbers); };
+    ForceFit out(plain, recorded, rows, of.depth, of.request.knots);
+    out.run(names, start, fixed, held);
+    return out;
+  }
+};
+
+/// The fit of the normal forces. `sticking`: what friction adds at all rows [N], or empty.
+FitTask normal_task(const Problem& of, std::vector<double> sticking) {
+  const auto forces = [&of, sticking = std::move(sticking)](const SkinNumbers& numbers,
+                                                            std::span<const DepthShift> shifts) {
+    std::vector<std::vector<double>> out =
+        shifted_forces(of.request.scene, of.recording, of.full(numbers), shifts);
+    for (std::vector<double>& row : out)
+      for (std::size_t k = 0; k < sticking.size(); ++k) row[k] += sticking[k];
+    return out;
+  };
+  return {
+      forces, of.recording.normal(), of.normal_rows(), of.names.normal, of.names.held, {of.start},
+      {}};
+}
+
+/// Fits the normal forces, with friction of the sensor where `sticks`.
+ForceFit fit_normal(const Problem& of, bool sticks, FitTask& task) {
+  task = normal_task(of, {});
+  ForceFit out = task.fit(of);
+  for (int pass = 0; sticks && !of.names.normal.empty() && pass < kFrictionPasses; ++pass) {
+    const SkinNumbers numbers = of.full(out.found());
+    if (!has_friction(of.request, of.recording, numbers)) break;
+    task = normal_task(of, friction_added(of.request.scene, of.recording, numbers));
+    out = task.fit(of);
+  }
+  return out;
+}
+
+/// Puts the forces of each row together: those along the normal, then those along the skin.
+std::vector<double> in_rows(std::span<const double> normal, std::span<const double> tangential,
+                            const PressRecording& r) {
+  const std::size_t a = normal_width(r), b = shear_width(r);
+  std::vector<double> out;
+  for (std::size_t row = 0; row < r.rows(); ++row) {
+    for (std::size_t k = row * a; k < (row + 1) * a; ++k) out.push_back(normal[k]);
+    for (std::size_t k = row * b; k < (row + 1) * b; ++k) out.push_back(tangential[k]);
+  }
+  return out;
+}
+
+/// Computes the forces of all rows along both directions. A rate moves what slips with the normal
+/// force.
+std::vector<double> joint_forces(const Problem& of, const SkinNumbers& numbers,
+                                 const DepthShift& shift) {
+  const PressRecording& r = of.recording;
+  const SkinNumbers full = of.full(numbers);
+  PathForces f = sheared_forces(of.request.scene, r, full, shift);
+  if (shift.rate != 0) {
+    const DepthShift still{.depth = shift.depth, .rows = shift.rows};
+    const auto both = shifted_forces(of.request.scene, r, full, std::array{shift, still});
+    const std::vector<double>&faster = both[0], &same = both[1];
+    for (std::size_t k = 0; k < same.size(); ++k) {
+      if (f.normal[k] > 0 && f.tangential.size() == same.size())
+        f.tangential[k] *= 1 + (faster[k] - same[k]) / f.normal[k];
+      f.normal[k] += faster[k] - same[k];
+    }
+  }
+  return in_rows(f.normal, f.tangential, r);
+}
+
+/// Fits ks and mu to the forces along the skin from several starts, of which the best end counts.
+/// `numbers`: of the normal forces.
+ForceFit fit_shear(const Problem& of, const SkinNumbers& numbers, bool slips) {
   const PressRecording& r = of.recording;
   const std::vector<double>& recorded = r.tangential();
-  const std::size_t width = shear_width(r);
-  const RowSums sums = row_sums(of.normal, recorded, r.points);
-  const auto path = [&](const SkinNumbers& chosen) {
-    const SkinNumbers numbers = of.full(chosen);
-    const Acting acting(r, numbers);
-    return shear_forces(of.request.scene(numbers), acting.whole());
+  const FitRows rows{.rows = of.rows, .width = shear_width(r), .alike = r.points > 0};
+  const double ratio = largest_ratio(r);
+  const auto path = [&of](const SkinNumbers& chosen) {
+    return sheared_forces(of.request.scene, of.recording, of.full(chosen)).tangential;
   };
-  const double depth = *std::ranges::max_element(r.depth);
   const auto fit_from = [&](const std::optional<SlipStart>& slip) {
     SkinNumbers at = of.start;
-    if (slip) scale_shear_start(path, of.names, out.found, sums, recorded, *slip, at);
-    SkinNumbers begin = out.found;
-    for (const std::string& name : of.names) begin[name] = at.at(name);  // none: a score
+    if (slip) scale_shear_start(path, of.names.shear, numbers, ratio, recorded, *slip, at);
+    SkinNumbers begin = numbers;
+    for (const std::string& name : of.names.shear) begin[name] = at.at(name);  // none: a score
     check_shear_sign(path, begin, recorded);
-    ForceFit fit(path, recorded, {out.rows, width}, depth, 0);
-    fit.run(of.names, at, out.found);
-    return std::pair{error_of(path(fit.found()), recorded, out.rows, width).root_mean_square, fit};
+    ForceFit fit(path, recorded, rows, of.depth, 0);
+    fit.run(of.names.shear, {at}, numbers);
+    return std::pair{error_of(path(fit.found()), recorded, of.rows, rows.width).root_mean_square,
+                     fit};
   };
-  const bool slips = std::ranges::count(of.names, kFriction) > 0;
   auto [least, across] = fit_from(slips ? std::optional(kSlipStarts[0]) : std::nullopt);
   for (std::size_t k = 1; slips && k < std::size(kSlipStarts); ++k)
     if (auto [error, fit] = fit_from(kSlipStarts[k]); error < least) least = error, across = fit;
-  across.add_errors_of(of.along);
-  add_fit(across, out);
-  if (std::ranges::count(across.untold(), kFriction, &UntoldNumber::name) > 0 &&
-      out.found.at(kFriction) > 0)
+  return across;
+}
+
+/// Fits the forces along both directions, from the fits of each. They count by their own errors.
+ForceFit fit_jointly(const Problem& of, const ForceFit& along, const ForceFit& across,
+                     FitTask& task) {
+  const PressRecording& r = of.recording;
+  const std::size_t width = normal_width(r);
+  task.forces = [&of](const SkinNumbers& numbers, std::span<const DepthShift> shifts) {
+    std::vector<std::vector<double>> out;
+    for (const DepthShift& shift : shifts) out.push_back(joint_forces(of, numbers, shift));
+    return out;
+  };
+  task.recorded = in_rows(r.normal(), r.tangential(), r);
+  task.rows.width = width + shear_width(r);
+  task.rows.normal = width;
+  task.names = along.names();
+  task.start.at = task.fixed = across.found();
+  task.names.insert(task.names.end(), across.names().begin(), across.names().end());
+  task.start.settled = task.names;
+  std::erase(task.start.settled, kRelaxation);
+  const bool untold = std::ranges::count(along.untold(), kRelaxation, &UntoldNumber::name) > 0;
+  if (untold) task.names.emplace_back(kRelaxation);  // which a shear may tell
+  for (const std::string& name : task.names) task.fixed.erase(name);
+  ForceFit out = task.fit(of);
+  for (int pass = 0; pass < kWeightPasses; ++pass) {
+    const auto [normal, tangential] = out.force_errors();
+    if (!(normal > 0 && tangential > 0)) break;
+    const double weight = std::clamp(normal / tangential, 1 / kMostWeight, kMostWeight),
+                 change = weight / task.rows.weight;
+    if (change < kLittleWeight && change > 1 / kLittleWeight) break;
+    task.rows.weight = weight;
+    task.start.at = out.found();
+    out = task.fit(of);
+  }
+  return out;
+}
+
+/// Repeats a fit with errors of the depth, if there are any.
+void add_depth_errors(const Problem& of, const FitTask& task, ForceFit& fit, Calibration& out) {
+  const PressRecording& r = of.recording;
+  if (r.points > 0 && of.request.depth_error.value_or(0) > 0)
+    throw InputError(
+        "errors of the depth of a field; expected none: its intervals are also those of errors of "
+        "whole rows, which contain them");
+  const double deviation = of.request.depth_error.value_or(r.points > 0 ? 0 : r.depth_scatter());
+  if (fit.names().empty() || !(deviation > 0)) return;
+  const SkinNumbers found = fit.found();
+  const bool rates = of.request.start.contains(kRelaxation);
+  const auto errors = std::make_shared<DepthErrors>(task.forces, r, task.rows, deviation, rates);
+  std::vector<double> off = task.unmoved(found);
+  for (std::size_t k = 0; k < off.size(); ++k) off[k] -= task.recorded[k];
+  const bool estimated = !of.request.depth_error;
+  if (estimated && !(told_depth_error(*errors, r, found, off) > 0)) return;
+  const std::array<double, 2> deviations = fit.force_errors();
+  out.depth_error = {deviation, estimated};
+  FitStart start = task.start;
+  for (int pass = 0; pass < kErrorPasses; ++pass) {
+    start.at = fit.found();
+    off = errors->forces(start.at);
+    for (std::size_t k = 0; k < off.size(); ++k) off[k] -= task.recorded[k];
+    errors->choose_errors(start.at, off, deviations);
+    ForceFit next([errors](const SkinNumbers& numbers) { return errors->forces(numbers); },
+                  task.recorded, task.rows, of.depth, of.request.knots,
+                  [errors](const SkinNumbers& numbers, const std::vector<double>& left) {
+                    return errors->whitened(numbers, left);
+                  });
+    next.run(fit.names(), start, task.fixed, task.held);
+    fit = next;
+  }
+}
+
+/// Finds how far the forces along the skin are off.
+void add_shear_errors(const Problem& of, Calibration& out) {
+  const std::vector<double> shear =
+      sheared_forces(of.request.scene, of.recording, out.found).tangential;
+  const std::vector<double>& recorded = of.recording.tangential();
+  out.shear = error_of(shear, recorded, out.rows, shear_width(of.recording));
+  out.shear_held_out = error_of(shear, recorded, out.held_out, shear_width(of.recording));
+}
+
+/// Fits all numbers.
+void fit_all(const Problem& of, Calibration& out) {
+  const PressRecording& r = of.recording;
+  const bool sheared =
+      !of.names.shear.empty() || (!of.request.fit && !r.shear.empty() && !r.tangential().empty());
+  const bool jointly = !of.names.shear.empty() && !of.names.normal.empty();
+  FitTask task;
+  ForceFit fit = fit_normal(of, !jointly && (of.request.friction || is_sheared(r)), task);
+  std::vector<UntoldNumber> untold = fit.untold();
+  out.converged = fit.converged();
+  if (jointly) {
+    const bool slips = std::ranges::count(of.names.shear, kFriction) > 0;
+    const ForceFit across = fit_shear(of, fit.found(), slips);
+    untold.insert(untold.end(), across.untold().begin(), across.untold().end());
+    fit = fit_jointly(of, fit, across, task);
+    std::erase_if(untold, [&](const UntoldNumber& number) {
+      return std::ranges::count(fit.names(), number.name) > 0;
+    });
+    for (const UntoldNumber& number : fit.untold())
+      if (std::ranges::count(untold, number.name, &UntoldNumber::name) == 0)
+        untold.push_back(number);
+  }
+  add_depth_errors(of, task, fit, out);
+  add_given(fit, of.names, !of.request.numbers.empty(), r.points > 0, out);
+  add_fit(fit, out);
+  out.untold.insert(out.untold.end(), untold.begin(), untold.end());
+  out.zero_correlation = fit.correlation(kZero, kForceZero);
+  if (of.request.knots > 0) out.found[kDepth] = table_depth(of.depth, out.found);
+  if (sheared && !jointly) {  // of a stiffness that is not fitted
+    const bool slips = std::ranges::count(of.names.shear, kFriction) > 0;
+    const ForceFit across = fit_shear(of, out.found, slips);
+    add_fit(across, out);
+    out.untold.insert(out.untold.end(), across.untold().begin(), across.untold().end());
+  }
+  if (std::ranges::count(out.untold, kFriction, &UntoldNumber::name) > 0 &&
+      number_or(out.found, kFriction, 0) > 0)
     out.least_friction = largest_ratio(r);
-  const std::vector<double> shear = path(out.found);
-  out.shear = error_of(shear, recorded, out.rows, width);
-  out.shear_held_out = error_of(shear, recorded, out.held_out, width);
+  if (sheared) add_shear_errors(of, out);
+  if (!of.names.normal.empty()) out.friction = friction_share(of.request, r, fit, out.found);
 }
 
 }  // namespace
@@ -504,7 +510,7 @@ std::vector<int> held_out_rows(double hold_out, int rows) {
 }
 
 Calibration calibrate(const CalibrationRequest& request, const PressRecording& recording) {
-  check(recording);
+  check_recording(recording);
   Calibration out;
   out.held_out = held_out_rows(request.hold_out, int(recording.rows()));
   if (request.start.contains(kRelaxation)) out.turns = recording.turns();
@@ -521,46 +527,20 @@ Calibration calibrate(const CalibrationRequest& request, const PressRecording& r
   check_table_rows(request, names, rows.size(), normal_width(recording));
   if (!names.shear.empty() && !(peak_of(recording.tangential()) > 0))
     throw InputError("a shear without any force; expected shear forces, or no columns of a shear");
-
   SkinNumbers start = request.start;
   if (!names.normal.empty()) scale_start(request, recording, depth, start);
-  const std::vector<double>& force = recording.normal();
-  const std::size_t width = normal_width(recording);
-  std::vector<double> sticking(force.size());  // of friction, held while the rest is fitted
-  const auto full = [&](SkinNumbers numbers) {
-    if (request.knots > 0) numbers[kDepth] = table_depth(depth, numbers);
-    return numbers;
-  };
-  const auto press = [&](const SkinNumbers& numbers) {
-    std::vector<double> computed = normal_forces(request, recording, full(numbers));
-    for (std::size_t k = 0; k < computed.size(); ++k) computed[k] += sticking[k];
-    return computed;
-  };
-  const FitRows fitted{rows, width};
-  ForceFit along(press, force, fitted, depth, request.knots);
-  along.run(names.normal, start, out.found, names.held);
-  for (int pass = 0; request.friction && !names.normal.empty() && pass < kFrictionPasses; ++pass) {
-    sticking = friction_forces(request, recording, full(along.found()));
-    along = ForceFit(press, force, fitted, depth, request.knots);
-    along.run(names.normal, start, out.found, names.held);
-  }
-  add_given(along, names, !request.numbers.empty(), recording.points > 0, out);
-  add_fit(along, out);
-  out.zero_correlation = along.correlation(kZero, kForceZero);
-  if (request.knots > 0) out.found[kDepth] = table_depth(depth, out.found);
+  fit_all({request, recording, names, rows, start, depth}, out);
   out.rows_above = rows_above(acting_depths(recording, out.found), rows);
   const std::vector<double> normal = all_forces(request, recording, out.found);
-  out.normal = error_of(normal, force, rows, width);
-  out.normal_held_out = error_of(normal, force, out.held_out, width);
-  const bool sheared = !names.shear.empty() || (!request.fit && !recording.shear.empty() &&
-                                                !recording.tangential().empty());
-  if (sheared) fit_shear({request, recording, names.shear, start, normal, along, full}, out);
-  if (!names.normal.empty()) out.friction = friction_share(request, recording, along, out.found);
+  const std::vector<double>& force = recording.normal();
+  out.normal = error_of(normal, force, rows, normal_width(recording));
+  out.normal_held_out = error_of(normal, force, out.held_out, normal_width(recording));
   return out;
 }
+
 PressError check_calibration(const CalibrationRequest& request, const SkinNumbers& found,
                              const PressRecording& recording, std::vector<int> rows) {
-  check(recording);
+  check_recording(recording);
   for (const char* const name : {kLag, kRelaxation})
     if (found.contains(name) && recording.time.empty())
       throw InputError(fmt::format(

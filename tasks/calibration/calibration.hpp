@@ -2,13 +2,14 @@
 // Fits a skin's numbers to a recorded press (docs/calibration.md).
 #pragma once
 
-#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "tasks/calibration/force_fit.hpp"
 #include "tasks/calibration/press.hpp"
+#include "tasks/calibration/press_error.hpp"
+#include "tasks/calibration/row_forces.hpp"
 
 namespace tangere {
 
@@ -17,7 +18,7 @@ struct CalibrationRequest {
   /// sensor's own. Others are the sensor's own, whatever scenes were made before. A table has
   /// `knots` pressures [Pa] "pressure[1]", … after 0, evenly spread up to the depth "table_depth"
   /// [m].
-  std::function<Scene(const SkinNumbers&)> scene;
+  SkinScene scene;
   /// Attributes that may be fitted, with positive values at which the fit begins: `modulus` or
   /// `kn`, and of `relaxation`, `ks` and `mu` those that the sensor can have.
   SkinNumbers start;
@@ -31,19 +32,14 @@ struct CalibrationRequest {
   std::vector<std::string> numbers{};
   /// Whether anything is fitted if `numbers` is empty.
   bool fit = true;
-  /// Whether the normal force is fitted with the friction that the sensor has. Without times, or
-  /// with a shear, it is that of a slow press.
+  /// Whether the normal force of a press without a shear is fitted with the friction that the
+  /// sensor has. Without times it is that of a slow press.
   bool friction = false;
+  /// Standard deviation of the errors of depths [m]; 0: they have none. Left out, it is estimated
+  /// where the recording tells it (told_depth_error()), of forces and not of fields.
+  std::optional<double> depth_error{};
   /// Rows that are compared and not fitted, of all; as held_out_rows().
   double hold_out = 0;
-};
-
-/// How far computed forces are off, over the largest recorded one.
-struct PressError {
-  int rows = 0;
-  double root_mean_square = 0, largest = 0;
-  double relative = 0;        ///< root mean square over that of the recorded forces
-  double largest_by_row = 0;  ///< over the row's own force, of rows above a twentieth of the peak
 };
 
 /// What friction adds to the normal force of a press, and how far it would move the numbers.
@@ -53,14 +49,22 @@ struct FrictionShare {
   std::vector<FittedNumber> moved;  ///< numbers of the normal force without their intervals: shares
 };
 
+/// Errors of the depths that a fit contains.
+struct DepthErrorFound {
+  double deviation = 0;  ///< [m]; 0: none
+  bool estimated = false;
+};
+
 struct Calibration {
   std::vector<FittedNumber> numbers;
   std::vector<UntoldNumber> untold;
   std::vector<GivenNumber> given;  ///< zeros that are not fitted
   /// Correlation of the errors of "zero" and "force_zero"; none unless both are fitted.
   std::optional<double> zero_correlation;
-  int rows_above = 0;      ///< of the fitted rows, those above the skin
-  std::vector<int> turns;  ///< rows that are not fitted, because the rate of the depth jumps there
+  int rows_above = 0;  ///< of the fitted rows, those above the skin
+  /// Rows that are not fitted, because the rate of the depth or of the shear jumps there.
+  std::vector<int> turns;
+  DepthErrorFound depth_error;
   /// What the friction of the sensor adds; what it would move where the fit is without it.
   FrictionShare friction;
   SkinNumbers found;          ///< all numbers that were fitted, and "table_depth"
@@ -77,10 +81,12 @@ struct Calibration {
 /// Throws InputError unless one row is left to fit.
 std::vector<int> held_out_rows(double hold_out, int rows);
 
-/// Fits. Normal forces give all but ks and mu, which shear forces give then. Throws InputError for
-/// a recording without force, for a shear without any, for columns of unlike lengths, for times
-/// that do not ascend, for a path on which the sensor has no force, for a requested number that the
-/// columns cannot tell, and for a table without a positive depth.
+/// Fits. Without a shear, normal forces give all numbers. With a shear, normal forces and those
+/// along the skin are fitted together, with friction; each kind counts by its own errors. Throws
+/// InputError for a recording without force, for a shear without any, for columns of unlike lengths,
+/// for times that do not ascend, for a path on which the sensor has no force, for a requested number
+/// that the columns cannot tell, for a table without a positive depth, and for errors of the depth
+/// of a field.
 Calibration calibrate(const CalibrationRequest& request, const PressRecording& recording);
 
 /// Compares the normal forces of another recording with those of the numbers that were found, at

@@ -52,14 +52,22 @@ double ForceFit::Scale::slope(double x) const {
   return kind == Kind::square ? 2 * unit * x : unit;
 }
 
+double ForceFit::Scale::place(double value) const {
+  if (kind == Kind::linear) return 1 + value / unit;
+  constexpr double kLeast = 0.03;  // at 0 the derivative by x is 0
+  if (kind == Kind::square) return std::sqrt(std::max(value / unit, kLeast * kLeast));
+  return value > 0 ? 1 + std::log(value / unit) : 1;
+}
+
 ForceFit::ForceFit(Forces forces, std::span<const double> recorded, FitRows rows, double depth,
-                   int knots)
+                   int knots, Whitening whitening)
     : forces_(std::move(forces)),
       recorded_(recorded),
       rows_(std::move(rows)),
       peak_(0),
       depth_(depth),
-      knots_(knots) {
+      knots_(knots),
+      whitening_(std::move(whitening)) {
   for (const double f : recorded_) peak_ = std::max(peak_, std::abs(f));
 }
 
@@ -70,8 +78,31 @@ ForceFit::Scale ForceFit::scale_of(const std::string& name, const SkinNumbers& s
   return {vanishes ? Scale::Kind::square : Scale::Kind::exponential, start.at(name)};
 }
 
-void ForceFit::run(std::vector<std::string> names, const SkinNumbers& start, SkinNumbers fixed,
+ErrorModel ForceFit::errors() const {
+  return {.width = rows_.width,
+          .split = whitening_ ? 0 : rows_.normal,
+          .alike = rows_.alike,
+          .known = bool(whitening_)};
+}
+
+/// Returns the x at which a fit begins: 1, or that of a number's value.
+std::vector<double> ForceFit::begin(const SkinNumbers& at) const {
+  std::vector<double> out;
+  for (std::size_t k = 0; k < names_.size(); ++k) {
+    const auto value = at.find(names_[k]);
+    if (value == at.end()) {
+      out.push_back(1);
+      continue;
+    }
+    const bool goes_on = k > 0 && is_table_number(names_[k]) && is_table_number(names_[k - 1]);
+    out.push_back(scales_[k].place(value->second - (goes_on ? at.at(names_[k - 1]) : 0)));
+  }
+  return out;
+}
+
+void ForceFit::run(std::vector<std::string> names, const FitStart& start, SkinNumbers fixed,
                    std::vector<std::string> held) {
+  settled_ = start.settled;
   for (std::size_t at = 0; at < names.size(); ++at) {
     if (names[at] != kTable) continue;
     names.erase(names.begin() + std::ptrdiff_t(at));
@@ -82,10 +113,9 @@ void ForceFit::run(std::vector<std::string> names, const SkinNumbers& start, Ski
     names_ = names, held_ = held;
     fixed_ = fixed;
     scales_.clear();
-    for (const std::string& name : names) scales_.push_back(scale_of(name, start));
+    for (const std::string& name : names) scales_.push_back(scale_of(name, start.scale));
     if (names.empty()) return;
-    found_ = minimise([&](std::span<const double> x) { return residuals(x); },
-                      std::vector<double>(names.size(), 1.0));
+    found_ = minimise([&](std::span<const double> x) { return residuals(x); }, begin(start.at));
     find_confidence();
     std::size_t weak = weakest();
     if (weak == names.size()) find_secants(), weak = weakest();
@@ -112,19 +142,31 @@ SkinNumbers ForceFit::numbers_at(std::span<const double> x) const {
   return out;
 }
 
-/// Returns forces of all rows over the peak, at the rows that are fitted.
-std::vector<double> ForceFit::fitted(std::span<const double> forces) const {
+/// Returns the residuals of the fitted rows from differences of all rows [N].
+std::vector<double> ForceFit::weighed(const SkinNumbers& numbers,
+                                      const std::vector<double>& off) const {
+  if (whitening_) return whitening_(numbers, off);
   std::vector<double> out;
   for (const int row : rows_.rows)
-    for (std::size_t k = 0; k < rows_.width; ++k)
-      out.push_back(forces[std::size_t(row) * rows_.width + k] / peak_);
+    for (std::size_t k = 0; k < rows_.width; ++k) {
+      const bool along_skin = rows_.normal > 0 && k >= rows_.normal;
+      out.push_back(off[std::size_t(row) * rows_.width + k] / peak_ *
+                    (along_skin ? rows_.weight : 1));
+    }
   return out;
 }
 
 std::vector<double> ForceFit::residuals_of(const SkinNumbers& numbers) const {
   std::vector<double> off = forces_(numbers);
   for (std::size_t k = 0; k < off.size(); ++k) off[k] -= recorded_[k];
-  return fitted(off);
+  return weighed(numbers, off);
+}
+
+std::array<double, 2> ForceFit::force_errors() const {
+  std::array<double, 2> out = error_deviations(found_.jacobian, found_.residuals, errors());
+  if (out[0] > 0) out[0] *= peak_;
+  if (out[1] > 0) out[1] *= peak_ / rows_.weight;
+  return out;
 }
 
 std::vector<double> ForceFit::residuals(std::span<const double> x) const {
@@ -221,7 +263,7 @@ void ForceFit::find_secants() {
 void ForceFit::find_confidence() {
   Columns jacobian = found_.jacobian;
   for (const std::string& name : held_) jacobian.push_back(slope_by(name));
-  confidence_ = Confidence(jacobian, found_.residuals, rows_.width);
+  confidence_ = Confidence(jacobian, found_.residuals, errors());
 }
 
 void ForceFit::add_errors_of(const ForceFit& before) {
@@ -264,7 +306,7 @@ bool ForceFit::vanishes() const {
 /// interval goes beyond 0.
 std::size_t ForceFit::weakest() const {
   for (std::size_t k = 0; k < names_.size(); ++k) {
-    if (is_table_number(names_[k])) continue;
+    if (is_table_number(names_[k]) || std::ranges::count(settled_, names_[k]) > 0) continue;
     if (found_.influence(k) < kLeastInfluence) return k;
     if (names_[k] == kFriction && holds(k)) return k;
     if (names_[k] == kRelaxation && !(interval(k).low > 0)) return k;
@@ -296,12 +338,16 @@ std::vector<FittedNumber> ForceFit::numbers() const {
 }
 
 std::vector<FittedNumber> ForceFit::moves(std::span<const double> addition) const {
-  const std::vector<double> change = fitted(addition);
-  const Confidence answers(found_.jacobian);  // of the fitted numbers alone
+  return answers(weighed(found(), {addition.begin(), addition.end()}));
+}
+
+/// Returns by how much each number moves by a change of the residuals.
+std::vector<FittedNumber> ForceFit::answers(std::span<const double> change) const {
+  const Confidence alone(found_.jacobian);  // of the fitted numbers
   std::vector<FittedNumber> out;
   double pressure = 0;
   for (std::size_t k = 0; k < names_.size(); ++k) {
-    const double moved = scales_[k].slope(found_.x[k]) * answers.answer(k, change);
+    const double moved = scales_[k].slope(found_.x[k]) * alone.answer(k, change);
     if (is_table_number(names_[k])) pressure += moved;
     out.push_back({names_[k], is_table_number(names_[k]) ? pressure : moved});
   }
@@ -317,12 +363,10 @@ GivenNumber ForceFit::given(const std::string& name) const {
   all.push_back(slope);
   out.told = !Confidence(all).rank_misses(all.size() - 1);
   if (scales_[0].kind == Scale::Kind::linear) return out;
-  std::vector<double> addition(recorded_.size());
-  for (std::size_t k = 0; k < slope.size(); ++k)
-    addition[std::size_t(rows_.rows[k / rows_.width]) * rows_.width + k % rows_.width] =
-        kError * slope[k] * peak_;
+  std::vector<double> change = slope;
+  for (double& x : change) x *= kError;
   // Of a table the last pressure.
-  const std::vector<FittedNumber> moved = moves(addition), values = numbers();
+  const std::vector<FittedNumber> moved = answers(change), values = numbers();
   std::size_t k = 0;
   while (k + 1 < names_.size() && is_table_number(names_[k + 1])) ++k;
   out.moved = names_[k];

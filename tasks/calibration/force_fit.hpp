@@ -2,6 +2,7 @@
 // Least squares of one recorded force by named numbers, and which of them the force tells.
 #pragma once
 
+#include <array>
 #include <functional>
 #include <map>
 #include <optional>
@@ -48,22 +49,40 @@ std::string table_number(int k);
 /// Computes forces at all rows, one after the other.
 using Forces = std::function<std::vector<double>(const SkinNumbers&)>;
 
-/// The rows that are fitted, and how many numbers each has.
+/// The rows that are fitted, and the forces that each has.
 struct FitRows {
   std::vector<int> rows;
-  std::size_t width = 1;
+  std::size_t width = 1;   ///< forces of a row
+  bool alike = false;      ///< whether errors of the forces of a row may be alike
+  std::size_t normal = 0;  ///< the first of a row are along the normal, the rest along the skin;
+                           ///< 0: all are of one kind
+  double weight = 1;       ///< of forces along the skin, by that of those along the normal
+};
+
+/// Returns residuals of the fitted rows with errors of a variance of 1 from differences of all
+/// rows [N]: their errors may be of different sizes, and depend on one another.
+using Whitening =
+    std::function<std::vector<double>(const SkinNumbers&, const std::vector<double>& off)>;
+
+/// Where a fit begins.
+struct FitStart {
+  SkinNumbers scale;  ///< sizes of the numbers
+  SkinNumbers at{};   ///< where numbers of these names begin; others at their sizes, zeros at 0
+  std::vector<std::string> settled{};  ///< names that are not left out
 };
 
 class ForceFit {
  public:
-  /// `depth`: size of the zero [m]. `knots`: numbers of a table after its first.
-  ForceFit(Forces forces, std::span<const double> recorded, FitRows rows, double depth, int knots);
+  /// `depth`: size of the zero [m]. `knots`: numbers of a table after its first. Without
+  /// `whitening` residuals are forces by the peak.
+  ForceFit(Forces forces, std::span<const double> recorded, FitRows rows, double depth, int knots,
+           Whitening whitening = {});
 
   /// Fits `names` from `start`, with `fixed` numbers. Those that turn out not to be told are listed
   /// in untold() and left out, so that the fit of the rest is without them. `held`: numbers that
   /// are not fitted because the recording does not tell them. The intervals of the others contain
   /// that they are not known.
-  void run(std::vector<std::string> names, const SkinNumbers& start, SkinNumbers fixed,
+  void run(std::vector<std::string> names, const FitStart& start, SkinNumbers fixed,
            std::vector<std::string> held = {});
   /// Adds the errors of the numbers of an earlier fit, on which these forces depend, to the
   /// intervals.
@@ -80,6 +99,11 @@ class ForceFit {
   /// Correlation of the errors of two numbers; none unless both are fitted.
   [[nodiscard]] std::optional<double> correlation(const std::string& a, const std::string& b) const;
   [[nodiscard]] const std::vector<UntoldNumber>& untold() const { return untold_; }
+  /// Standard deviations of the errors of forces along the normal and of those along the skin [N];
+  /// -1 where there are no more of them than numbers.
+  [[nodiscard]] std::array<double, 2> force_errors() const;
+  /// Names that were fitted, of a table one for each number.
+  [[nodiscard]] const std::vector<std::string>& names() const { return names_; }
   /// All numbers of the fit, the fixed ones included.
   [[nodiscard]] SkinNumbers found() const { return numbers_at(found_.x); }
   [[nodiscard]] bool converged() const { return names_.empty() || found_.converged; }
@@ -91,10 +115,15 @@ class ForceFit {
     double unit;  ///< the start; linear: the number at x = 2
     [[nodiscard]] double value(double x) const;
     [[nodiscard]] double slope(double x) const;
+    [[nodiscard]] double place(double value) const;  ///< x of a value
   };
+  [[nodiscard]] std::vector<double> begin(const SkinNumbers& at) const;
   [[nodiscard]] Scale scale_of(const std::string& name, const SkinNumbers& start) const;
   [[nodiscard]] SkinNumbers numbers_at(std::span<const double> x) const;
-  [[nodiscard]] std::vector<double> fitted(std::span<const double> forces) const;
+  [[nodiscard]] ErrorModel errors() const;
+  [[nodiscard]] std::vector<double> weighed(const SkinNumbers& numbers,
+                                            const std::vector<double>& off) const;
+  [[nodiscard]] std::vector<FittedNumber> answers(std::span<const double> change) const;
   [[nodiscard]] std::vector<double> residuals_of(const SkinNumbers& numbers) const;
   [[nodiscard]] std::vector<double> residuals(std::span<const double> x) const;
   [[nodiscard]] std::vector<double> slope_by(const std::string& held) const;
@@ -115,6 +144,8 @@ class ForceFit {
   FitRows rows_;
   double peak_, depth_;
   int knots_;
+  Whitening whitening_;
+  std::vector<std::string> settled_;
   std::vector<std::string> names_;  // of a table: of its increments
   std::vector<std::string> held_;
   SkinNumbers fixed_;

@@ -19,6 +19,8 @@ using Matrix = Eigen::MatrixXd;
 constexpr double kDifference = 1e-10;  // relative error of the residuals, of which steps are roots
 constexpr double kLineStep = 5e-4;     // the third root of kDifference
 constexpr double kWeakest = 1e-9;      // eigenvalue of normalised columns that is an error
+constexpr double kLeastFreedom = 0.5;  // of residuals beyond numbers
+constexpr double kLeastShare = 1e-12;  // of a direction, that a part of the residuals tells
 constexpr double kUntoldShare = 1e-3;  // of a number, along what is not told
 constexpr Eigen::Index kMostPasses = 200;
 
@@ -52,13 +54,54 @@ double dot(std::span<const double> a, std::span<const double> b) {
 
 double norm(std::span<const double> a) { return std::sqrt(dot(a, a)); }
 
-/// Counts the residuals that are not 0, or that change.
-Eigen::Index telling(const Columns& jacobian, std::span<const double> residuals) {
-  Eigen::Index count = 0;
+/// Whether residual k is one of the first of its row (0) or of the rest (1).
+std::size_t part_of(std::size_t k, const ErrorModel& errors) {
+  return errors.split > 0 && k % errors.width >= errors.split ? 1 : 0;
+}
+
+/// Counts the residuals of both parts; where errors may be alike those that are not 0, or that
+/// change.
+std::array<double, 2> counts_of(const Columns& jacobian, std::span<const double> residuals,
+                                std::size_t m, const ErrorModel& errors) {
+  std::array<double, 2> out{};
+  for (std::size_t k = 0; k < m; ++k)
+    if (!errors.alike || (k < residuals.size() && residuals[k] != 0) ||
+        std::ranges::any_of(jacobian, [k](const auto& column) { return column[k] != 0; }))
+      ++out[part_of(k, errors)];
+  return out;
+}
+
+/// With the columns s of a matrix S, S Sᵀ = (JᵀJ)⁻¹: Sᵀ J_bᵀ J_b S.
+Matrix share_of_part(const Columns& jacobian, const Columns& solver, std::size_t part,
+                     const ErrorModel& errors) {
+  const auto rank = Eigen::Index(solver.size());
+  if (errors.split == 0) return Matrix::Identity(rank, rank) * (part == 0 ? 1.0 : 0.0);
+  const std::size_t m = jacobian.empty() ? 0 : jacobian[0].size();
+  Matrix out = Matrix::Zero(rank, rank);
+  Vector moved(rank);
+  for (std::size_t k = 0; k < m; ++k) {
+    if (part_of(k, errors) != part) continue;
+    for (Eigen::Index a = 0; a < rank; ++a) {
+      moved[a] = 0;
+      for (std::size_t j = 0; j < jacobian.size(); ++j)
+        moved[a] += solver[std::size_t(a)][j] * jacobian[j][k];
+    }
+    out += moved * moved.transpose();
+  }
+  return out;
+}
+
+/// Residuals of one part beyond the numbers that they tell.
+struct PartFreedom {
+  double freedom = 0, squares = 0;
+};
+PartFreedom freedom_of(const Columns& jacobian, std::span<const double> residuals,
+                       const Matrix& share, std::size_t part, const ErrorModel& errors) {
+  const std::size_t m = jacobian.empty() ? 0 : jacobian[0].size();
+  PartFreedom out{counts_of(jacobian, residuals, m, errors)[part] - share.trace(), 0};
   for (std::size_t k = 0; k < residuals.size(); ++k)
-    count += residuals[k] != 0 ||
-             std::ranges::any_of(jacobian, [k](const auto& column) { return column[k] != 0; });
-  return count;
+    if (part_of(k, errors) == part) out.squares += residuals[k] * residuals[k];
+  return out;
 }
 
 }  // namespace
@@ -97,7 +140,7 @@ std::vector<double> slope_along(const std::function<std::vector<double>(double)>
 }
 
 Confidence::Confidence(const Columns& jacobian, std::span<const double> residuals,
-                       std::size_t width)
+                       const ErrorModel& errors)
     : jacobian_(jacobian) {
   const auto n = Eigen::Index(jacobian.size());
   if (n == 0) return;
@@ -112,10 +155,6 @@ Confidence::Confidence(const Columns& jacobian, std::span<const double> residual
   }
   const Eigen::SelfAdjointEigenSolver<Matrix> modes(J.transpose().lazyProduct(J));
   const Vector& strength = modes.eigenvalues();
-  const auto rank = std::ranges::count_if(strength, [](double s) { return s >= kWeakest; });
-  const Eigen::Index freedom = (width > 1 ? telling(jacobian, residuals) : m) - rank;
-  const double error =
-      freedom > 0 ? student_95(int(freedom)) * norm(residuals) / std::sqrt(double(freedom)) : 0;
   const Vector scale = Eigen::Map<const Vector>(size_.data(), n).cwiseInverse();
   for (Eigen::Index k = 0; k < n; ++k) {
     const Vector direction = scale.cwiseProduct(modes.eigenvectors().col(k));
@@ -125,14 +164,44 @@ Confidence::Confidence(const Columns& jacobian, std::span<const double> residual
         missing_[std::size_t(j)] = std::hypot(missing_[std::size_t(j)], modes.eigenvectors()(j, k));
       continue;
     }
-    const double deviation = 1 / std::sqrt(strength[k]);
-    solver_.push_back(numbers_of(direction * deviation));
-    if (freedom > 0)
-      spread_.push_back(numbers_of(direction * deviation * error));
-    else
-      untold_.push_back(numbers_of(direction));
+    solver_.push_back(numbers_of(direction / std::sqrt(strength[k])));
   }
-  if (width > 1 && m / Eigen::Index(width) > rank) add_rows(residuals, width);
+  add_spread(residuals, errors);
+  if (errors.alike) add_rows(residuals, errors.width);
+}
+
+void Confidence::add_spread(std::span<const double> residuals, const ErrorModel& errors) {
+  if (solver_.empty()) return;
+  for (std::size_t part = 0; part < (errors.split > 0 ? 2U : 1U); ++part) {
+    const Matrix share = share_of_part(jacobian_, solver_, part, errors);
+    const PartFreedom of = freedom_of(jacobian_, residuals, share, part, errors);
+    const bool told = of.freedom > kLeastFreedom;
+    const double error = told ? student_95(std::max(1, int(of.freedom + kLeastFreedom))) *
+                                    (errors.known ? 1 : std::sqrt(of.squares / of.freedom))
+                              : 1;
+    const Eigen::SelfAdjointEigenSolver<Matrix> modes(share);
+    for (Eigen::Index k = 0; k < share.rows(); ++k) {
+      if (!(modes.eigenvalues()[k] > kLeastShare)) continue;
+      std::vector<double> direction(size_.size());
+      for (std::size_t a = 0; a < solver_.size(); ++a)
+        for (std::size_t j = 0; j < direction.size(); ++j)
+          direction[j] += solver_[a][j] * modes.eigenvectors()(Eigen::Index(a), k) * error *
+                          std::sqrt(modes.eigenvalues()[k]);
+      (told ? spread_ : untold_).push_back(direction);
+    }
+  }
+}
+
+std::array<double, 2> error_deviations(const Columns& jacobian, std::span<const double> residuals,
+                                       const ErrorModel& errors) {
+  std::array<double, 2> out{-1, -1};
+  const Confidence confidence(jacobian);
+  for (std::size_t part = 0; part < 2; ++part) {
+    const Matrix share = share_of_part(jacobian, confidence.solver(), part, errors);
+    const PartFreedom of = freedom_of(jacobian, residuals, share, part, errors);
+    if (of.freedom > kLeastFreedom) out[part] = std::sqrt(of.squares / of.freedom);
+  }
+  return out;
 }
 
 void Confidence::add_rows(std::span<const double> residuals, std::size_t width) {

@@ -8,6 +8,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
+#include <optional>
 
 #include "engine/base/error.hpp"
 #include "engine/sense/readout.hpp"
@@ -53,15 +55,24 @@ class SkinForces {
   std::vector<double> forces_;
 };
 
+constexpr double kSlowStep = 1e3;   // to the first row of a path with times [s]
+constexpr double kSameStep = 1e-6;  // relative
+
 /// Drives the indenter along a path, and calls f after each row.
 void drive(const Model& model, const PressPath& path, const std::function<void(const Batch&)>& f) {
-  Stepper stepper(model);
+  const bool timed = path.time.size() > 1;
+  std::optional<Stepper> stepper;
   Batch batch(model, 1);
   batch.set_state(0, std::array<double, 3>{at(path.x, 0), at(path.y, 0), 1e-3},
                   std::array<double, 3>{});
   for (std::size_t k = 0; k < path.depth.size(); ++k) {
-    const double x = at(path.x, k), y = at(path.y, k), depth = path.depth[k];
-    stepper.step(batch, std::array<double, 3>{x, y, -depth});
+    const double x = at(path.x, k), y = at(path.y, k), depth = path.depth[k],
+                 step = !timed  ? model.timestep()
+                        : k > 0 ? path.time[k] - path.time[k - 1]
+                                : kSlowStep;
+    if (!stepper || std::abs(stepper->timestep() - step) > kSameStep * step)
+      stepper.emplace(model, StepperOptions{.timestep = step});
+    stepper->step(batch, std::array<double, 3>{x, y, -depth});
     if (failed(batch.status(0)))
       throw InputError(fmt::format(
           "row {}: the step to depth {} m and shear {} m failed: {}; expected a shorter "
@@ -82,21 +93,54 @@ std::vector<double> PressRecording::rates() const {
   return out;
 }
 
-std::vector<int> PressRecording::turns() const {
+namespace {
+
+/// Returns the rows at which the rate of a column jumps (PressRecording::turns()).
+std::vector<int> jumps_of(std::span<const double> column, std::span<const double> time) {
   constexpr double kJumps[] = {0.2, 0.5}, kMostTurns = 0.2;
   double largest = 0;
   std::vector<double> rate;  // from each row to the next
   for (std::size_t k = 1; k < time.size(); ++k) {
-    rate.push_back((depth[k] - depth[k - 1]) / (time[k] - time[k - 1]));
+    rate.push_back((column[k] - column[k - 1]) / (time[k] - time[k - 1]));
     largest = std::max(largest, std::abs(rate.back()));
   }
   for (const double jump : kJumps) {
     std::vector<int> out;
     for (std::size_t k = 1; k < rate.size(); ++k)
       if (std::abs(rate[k] - rate[k - 1]) > jump * largest) out.push_back(int(k));
-    if (double(out.size()) <= kMostTurns * double(rows())) return out;
+    if (double(out.size()) <= kMostTurns * double(column.size())) return out;
   }
   return {};
+}
+
+}  // namespace
+
+std::vector<int> PressRecording::turns() const {
+  std::vector<int> out = jumps_of(depth, time), both;
+  if (shear.empty()) return out;
+  std::ranges::set_union(out, jumps_of(shear, time), std::back_inserter(both));
+  return both;
+}
+
+double PressRecording::depth_scatter() const {
+  constexpr std::size_t kFewest = 12;     // differences
+  constexpr double kEven = 0.05;          // steps of time, by their mean
+  constexpr double kOfNormal = 0.674490;  // median of |x|, by the deviation
+  const double step = time.size() > 1 ? (time.back() - time.front()) / double(rows() - 1) : 0;
+  for (std::size_t k = 1; k < time.size(); ++k)
+    if (std::abs(time[k] - time[k - 1] - step) > kEven * step) return 0;
+  const std::vector<int> turning = turns();
+  std::vector<double> third;  // between turns
+  for (int k = 3; k < int(rows()); ++k) {
+    const auto turn = std::ranges::upper_bound(turning, k - 3);
+    if (turn != turning.end() && *turn < k) continue;
+    const double* const d = &depth[std::size_t(k - 3)];
+    third.push_back(std::abs(d[3] - 3 * d[2] + 3 * d[1] - d[0]));
+  }
+  if (third.size() < kFewest) return 0;
+  const auto middle = third.begin() + std::ssize(third) / 2;
+  std::ranges::nth_element(third, middle);
+  return *middle / (kOfNormal * std::sqrt(20.0));
 }
 
 Scene placed_indenter(const Scene& scene) {
@@ -136,34 +180,40 @@ Scene without_rates(const Scene& scene) {
   TactileDescription& sensor = slow.sensors.at(0);
   sensor.coefficients.kt = sensor.coefficients.damping = 0;
   if (sensor.material) sensor.material->relaxation = 0;
+  if (sensor.table) sensor.table->relaxation = 0;
   return slow;
 }
 
-std::vector<double> shear_forces(const Scene& scene, const PressPath& path) {
-  const Model model(without_rates(scene));
+PathForces path_forces(const Scene& scene, const PressPath& path) {
+  const Model model(path.time.size() > 1 ? scene : without_rates(scene));
   SkinForces forces(model, path.fields);
-  std::vector<double> out;
-  drive(model, path, [&](const Batch& batch) { forces.add_tangential(batch, out); });
+  PathForces out;
+  drive(model, path, [&](const Batch& batch) {
+    forces.add_normal(batch, out.normal);
+    forces.add_tangential(batch, out.tangential);
+  });
   return out;
 }
 
+std::vector<double> shear_forces(const Scene& scene, const PressPath& path) {
+  return path_forces(scene, path).tangential;
+}
+
+std::vector<double> path_rates(const PressPath& path) {
+  std::vector<double> rate(path.depth.size());
+  for (std::size_t k = 1; k < rate.size() && path.time.size() > 1; ++k)
+    rate[k] = (path.depth[k] - path.depth[k - 1]) / (path.time[k] - path.time[k - 1]);
+  return rate;
+}
+
 std::vector<double> friction_shares(const Scene& scene, const PressPath& path) {
-  const std::size_t rows = path.depth.size();
   const bool timed = path.time.size() > 1;
-  Scene sticky = timed ? scene : without_rates(scene);
-  if (timed) sticky.timestep = (path.time.back() - path.time.front()) / double(rows - 1);
-  const Model model(sticky);
-  SkinForces forces(model, path.fields);
-  std::vector<double> out, rate(rows);
-  drive(model, path, [&](const Batch& batch) { forces.add_normal(batch, out); });
-  for (std::size_t k = 1; k < rows && timed; ++k)
-    rate[k] = (path.depth[k] - path.depth[k - 1]) / sticky.timestep;
+  std::vector<double> out = path_forces(scene, path).normal;
+  const std::vector<double> rate = path_rates(path);
   PressPath same = path;
   same.rate = rate;
-  const std::vector<double> smooth = press_forces(sticky, same);
+  const std::vector<double> smooth = press_forces(timed ? scene : without_rates(scene), same);
   for (std::size_t k = 0; k < out.size(); ++k) out[k] -= smooth[k];
-  // The rate of the first row is that from above the skin.
-  if (timed) std::fill_n(out.begin(), out.size() / rows, 0.0);
   return out;
 }
 

@@ -19,13 +19,12 @@ constexpr double kDeepestPress = 0.05, kShallowest = 5e-6;  // [m], without a th
 constexpr double kFastestPress = 2;                         // [m/s]
 constexpr double kLeastModulus = 5e3, kMostModulus = 2e7;   // of skins [Pa]
 constexpr double kSoftest = 5e5, kStiffest = 5e10;          // by area, without a thickness [N/m³]
+constexpr double kFarDecades = 2, kNearDecades = 0.5;       // from the layout's, as powers of 10
 constexpr double kFilm = 2.3;                               // kn t/E of a film (docs/skin.md)
 constexpr double kCellError = 0.09, kMostCellError = 0.04;  // h/√(R d) has this error of a force
 constexpr int kFewestPoints = 9;
-constexpr double kNoisyRate = 0.05;             // error of a rate, of the largest
-constexpr double kFastShear = 0.05;             // speed · relaxation, of the slip distance
-constexpr std::size_t kFewestDifferences = 12;  // of depths, whose noise is estimated
-constexpr double kUsualLayerCell = 0.2;         // of a layer, by the thickness
+constexpr double kNoisyRate = 0.05;      // error of a rate, of the largest
+constexpr double kUsualLayerCell = 0.2;  // of a layer, by the thickness
 
 /// "; 0.0075 if it is in mm".
 std::string factor_text(double value, double factor, const char* what) {
@@ -175,16 +174,50 @@ void warn_of_resolution(const TactileDescription& d, double ball, double depth,
         cell, touched, 100 * error, kMostCellError * touched / kCellError));
 }
 
-/// What forces may be in that are 1000 times too large, or too small.
-const char* force_unit_text(const PressRecording& r, bool large) {
-  if (r.points > 0)
-    return large ? "in mN: name the field with --column field=0.001*NAME"
-                 : "in kN, or were divided by 1000: name the field with --column field=1000*NAME";
+/// A unit that recorded forces may be in, and its factor.
+struct ForceUnit {
+  double factor;
+  std::string name;
+};
+/// `area`: for which a point stands [m²]; 0: not known.
+std::vector<ForceUnit> force_units(const PressRecording& r, double area) {
   if (is_milli(r.units.force))
-    return large ? "1000 times too large, in uN: divide them by 1000"
-                 : "in N: name the column force_N";
-  return large ? "in mN: name the column force_mN" : "in kN, or were divided by 1000";
+    return {{1e-3, "1000 times too large, in uN: divide them by 1000"},
+            {1e3, "in N: name the column force_N"}};
+  if (r.points == 0)
+    return {{1e-3, "in mN: name the column force_mN"}, {1e3, "in kN, or were divided by 1000"}};
+  std::vector<ForceUnit> out;
+  const auto add = [&](double factor, const char* unit) {
+    out.push_back({factor, fmt::format("in {}: name the field with --column field={:.4g}*NAME",
+                                       unit, factor)});
+  };
+  add(1e-3, "mN"), add(1e3, "kN, or were divided by 1000");
+  if (area > 0) add(1e3 * area, "kPa, pressures on the area of a point"), add(area, "Pa, likewise");
+  return out;
 }
+
+double area_of(const TactileDescription& d) {
+  if (d.cell > 0 || !d.points.empty()) return d.cell;
+  return std::pow(mean_pitch(d.array), 2);
+}
+
+/// Stiffness of a skin: Young's modulus [Pa], or by area [N/m³].
+struct SkinStiffness {
+  double value;
+  bool modulus;
+};
+std::optional<SkinStiffness> stiffness_of(const TactileDescription& d) {
+  const double area = area_of(d);
+  const std::optional<double> thickness = thickness_of(d);
+  if (d.layer && d.material) return SkinStiffness{d.material->modulus, true};
+  if (!d.table && !(area > 0)) return std::nullopt;
+  const double kn = d.table ? d.table->stiffness() : d.coefficients.kn / area;
+  if (thickness) return SkinStiffness{kn * *thickness / kFilm, true};
+  return SkinStiffness{kn, false};
+}
+
+/// How far two positive numbers are apart, as a power of 10.
+double decades(double a, double b) { return std::abs(std::log10(a / b)); }
 
 }  // namespace
 
@@ -200,28 +233,35 @@ std::vector<std::string> press_warnings(const Scene& scene, const PressRecording
   return out;
 }
 
-std::vector<std::string> skin_warnings(const Scene& scene, const PressRecording& r) {
-  const TactileDescription& d = scene.sensors.at(0);
-  const std::optional<double> thickness = thickness_of(d);
-  double area = d.cell;
-  if (!(area > 0) && d.points.empty()) area = std::pow(mean_pitch(d.array), 2);
-  const bool elastic = d.layer && d.material;
-  if (!elastic && !d.table && !(area > 0)) return {};
-  const double kn = d.table   ? d.table->stiffness()
-                    : elastic ? 0
-                              : d.coefficients.kn / area,
-               value = elastic     ? d.material->modulus
-                       : thickness ? kn * *thickness / kFilm
-                                   : kn;
-  const bool modulus = elastic || thickness;
-  const double low = modulus ? kLeastModulus : kSoftest, high = modulus ? kMostModulus : kStiffest;
-  if (value >= low && value <= high) return {};
-  const double factor = value > high ? 1e-3 : 1e3, other = value * factor;
+std::vector<std::string> skin_warnings(const Scene& scene, const Scene& layout,
+                                       const PressRecording& r) {
+  const std::optional<SkinStiffness> found = stiffness_of(scene.sensors.at(0)),
+                                     own = stiffness_of(layout.sensors.at(0));
+  if (!found || !(found->value > 0)) return {};
+  const bool modulus = found->modulus;
+  const double value = found->value, low = modulus ? kLeastModulus : kSoftest,
+               high = modulus ? kMostModulus : kStiffest;
+  const auto plausible = [=](double x) { return x >= low && x <= high; };
+  // The layout's, if it is of the same kind and one that skins have.
+  const bool known = own && own->modulus == modulus && plausible(own->value);
+  const double usual = known ? own->value : std::sqrt(low * high);
+  std::vector<ForceUnit> units;
+  for (const ForceUnit& unit : force_units(r, area_of(scene.sensors[0])))
+    if (plausible(value * unit.factor)) units.push_back(unit);
+  const auto off = [&](const ForceUnit& unit) { return decades(value * unit.factor, usual); };
+  std::ranges::stable_sort(units, {}, off);
+  const bool near = known && !units.empty() && decades(value, usual) > kFarDecades &&
+                    off(units[0]) < kNearDecades;
+  if (plausible(value) && !near) return {};
+  const char* const what = modulus ? "Pa (Young's modulus)" : "N/m³ (stiffness by area)";
   std::string text =
-      fmt::format("a skin of {:.3g} {}; expected {:.0e} to {:.0e}", value,
-                  modulus ? "Pa (Young's modulus)" : "N/m³ (stiffness by area)", low, high);
-  if (other >= low && other <= high)
-    text += fmt::format("; {:.3g} if forces are {}", other, force_unit_text(r, factor < 1));
+      plausible(value)
+          ? fmt::format("a skin of {:.3g} {}, {:.2g} times the {:.3g} of the layout", value, what,
+                        value / usual, usual)
+          : fmt::format("a skin of {:.3g} {}; expected {:.0e} to {:.0e}", value, what, low, high);
+  for (std::size_t k = 0; k < units.size(); ++k)
+    if (k == 0 || off(units[k]) < off(units[0]) + kNearDecades)
+      text += fmt::format("; {:.3g} if forces are {}", value * units[k].factor, units[k].name);
   return {text};
 }
 
@@ -234,29 +274,8 @@ double median(std::vector<double> numbers) {
   return *middle;
 }
 
-double largest_step(const std::vector<double>& column, const std::vector<double>& time) {
-  double out = 0;
-  for (std::size_t k = 1; k < column.size(); ++k)
-    out = std::max(out, std::abs(column[k] - column[k - 1]) / (time[k] - time[k - 1]));
-  return out;
-}
-
-/// Standard deviation of the errors of evenly timed depths, by third differences, which a smooth
-/// motion has hardly; of normal errors σ their median size is 0.6745 √20 σ [m].
-double depth_noise(const PressRecording& r) {
-  const std::vector<int> turns = r.turns();
-  std::vector<double> third;  // between turns
-  for (int k = 3; k < int(r.rows()); ++k) {
-    const auto turn = std::ranges::upper_bound(turns, k - 3);
-    if (turn != turns.end() && *turn < k) continue;
-    const double* const d = &r.depth[std::size_t(k - 3)];
-    third.push_back(std::abs(d[3] - 3 * d[2] + 3 * d[1] - d[0]));
-  }
-  if (third.size() < kFewestDifferences) return 0;
-  return median(third) / (0.6745 * std::sqrt(20.0));
-}
-
-void warn_of_rates(const PressRecording& r, double relaxation, std::vector<std::string>& out) {
+void warn_of_rates(const PressRecording& r, double relaxation, bool contained,
+                   std::vector<std::string>& out) {
   std::vector<double> steps;
   for (std::size_t k = 1; k < r.time.size(); ++k) steps.push_back(r.time[k] - r.time[k - 1]);
   const double step = median(steps);
@@ -267,39 +286,24 @@ void warn_of_rates(const PressRecording& r, double relaxation, std::vector<std::
         step, relaxation, relaxation));
   double fastest = 0;
   for (const double rate : r.rates()) fastest = std::max(fastest, std::abs(rate));
-  const double noise = depth_noise(r), error = noise / (std::sqrt(2.0) * step);
-  if (error > kNoisyRate * fastest)
+  const double noise = r.depth_scatter(), error = noise / (std::sqrt(2.0) * step);
+  if (!contained && error > kNoisyRate * fastest)
     out.push_back(fmt::format(
         "depths scatter by about {:.2g} m, so rates by {:.2g} m/s, {:.0f} % of the largest: the "
-        "intervals do not contain errors of the depth, and the relaxation found may be too small",
+        "forces do not follow, so the intervals do not contain errors of the depth; if they are "
+        "errors, --depth-error has their deviation",
         noise, error, 100 * error / fastest));
-}
-
-/// A shear at the speed v has kt v = ks τ v beside its springs, which slip at mu N.
-void warn_of_shear_speed(const TactileDescription& d, const PressRecording& r, double relaxation,
-                         std::vector<std::string>& out) {
-  const ContactCoefficients& c = d.coefficients;
-  const double depth = *std::ranges::max_element(r.depth), area = d.cell > 0 ? d.cell : 1,
-               kn = d.table ? d.table->stiffness() * area : c.kn;
-  if (!(c.ks > 0 && c.mu > 0 && kn > 0 && depth > 0)) return;
-  const double speed = largest_step(r.shear, r.time), slip = c.mu * kn * depth / c.ks;
-  if (speed * relaxation > kFastShear * slip)
-    out.push_back(fmt::format(
-        "a shear at {:.3g} m/s and a relaxation of {:.3g} s: {:.2g} m, {:.0f} % of the {:.2g} m at "
-        "which the deepest point slips; the forces of a shear are computed as slow, so ks and mu "
-        "take up what the speed does: shear more slowly",
-        speed, relaxation, speed * relaxation, 100 * speed * relaxation / slip, slip));
 }
 
 }  // namespace
 
-std::vector<std::string> rate_warnings(const Scene& scene, const PressRecording& r) {
+std::vector<std::string> rate_warnings(const Scene& scene, const PressRecording& r,
+                                       bool depth_errors) {
   const TactileDescription& d = scene.sensors.at(0);
   const double relaxation = d.table ? d.table->relaxation : d.material ? d.material->relaxation : 0;
   std::vector<std::string> out;
   if (r.time.size() < 2 || !(relaxation > 0)) return out;
-  warn_of_rates(r, relaxation, out);
-  if (!r.shear.empty()) warn_of_shear_speed(d, r, relaxation, out);
+  warn_of_rates(r, relaxation, depth_errors, out);
   return out;
 }
 

@@ -17,14 +17,19 @@ namespace tangere {
 std::vector<std::string> press_warnings(const Scene& scene, const PressRecording& recording);
 
 /// Returns what is implausible about a skin that was fitted to a recording: a stiffness that no
-/// skin has. `scene`: of placed_indenter(), with the fitted numbers. Empty if nothing is.
-std::vector<std::string> skin_warnings(const Scene& scene, const PressRecording& recording);
+/// skin has, or one that is more than 100 times that of the layout or less than a hundredth, where
+/// another unit of the forces leads back to the layout's within a factor of 3. The unit is named:
+/// mN or kN, and of a field also kPa and Pa on the area of a point. `scene`, `layout`: of
+/// placed_indenter(), with the fitted numbers and as it was. Empty if nothing is.
+std::vector<std::string> skin_warnings(const Scene& scene, const Scene& layout,
+                                       const PressRecording& recording);
 
 /// Returns what rates do that a fit of a recording with times does not contain: rows that are
-/// farther apart than the relaxation, rates that are noisy because depths are, and a shear whose
-/// speed changes its forces. `scene`: of placed_indenter(), with the fitted numbers. Empty for a
-/// skin without relaxation.
-std::vector<std::string> rate_warnings(const Scene& scene, const PressRecording& recording);
+/// farther apart than the relaxation, and rates that are noisy because depths are. `scene`: of
+/// placed_indenter(), with the fitted numbers. `depth_errors`: whether the fit contains errors of
+/// the depth. Empty for a skin without relaxation.
+std::vector<std::string> rate_warnings(const Scene& scene, const PressRecording& recording,
+                                       bool depth_errors);
 
 /// Why an indenter that goes `depth` [m] deep touches no point of the sensor; "" if it does.
 /// `scene`: of placed_indenter().

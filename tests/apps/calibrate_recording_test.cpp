@@ -168,6 +168,14 @@ TEST(CalibrateRecording, ImplausibleUnitsAreNamed) {
   EXPECT_THAT(run(folder, ball).err, HasSubstr("if forces are in N: name the column force_N"));
   press("depth,force", 1, 1e-3);
   EXPECT_THAT(run(folder, ball).err, HasSubstr("if forces are in kN, or were divided by 1000"));
+  // Plausible, but not beside the layout's.
+  folder.write("skin.xml", layout("modulus=\"1e4\" thickness=\"4e-3\" mu=\"0\""));
+  press("depth,force", 1, 50);
+  EXPECT_THAT(run(folder, ball).err, HasSubstr("times the 1e+04 of the layout; 1e+04 if forces are "
+                                               "in mN: name the column force_mN"));
+  press("depth,force", 1, 1);
+  EXPECT_EQ(run_json(folder, ball)["warnings"], json::array()) << "20 times the layout's";
+  folder.write("skin.xml", layout("modulus=\"2e5\" thickness=\"4e-3\" mu=\"0\""));
   press("depth_mm,force_mN", 1e3, 1e3);
   EXPECT_EQ(run_json(folder, ball)["warnings"], json::array());
   press("depth,force", 1e3, 1);
@@ -352,24 +360,6 @@ TEST(CalibrateRecording, WhatRatesDoIsNamed) {
   EXPECT_EQ(err(1e-3, 0), "");
   EXPECT_THAT(err(0.03, 0), HasSubstr("rows are 0.03 s apart, longer than the relaxation of 0.02"));
   EXPECT_THAT(err(1e-3, 2e-6), HasSubstr("the intervals do not contain errors of the depth"));
-}
-
-/// The forces of a shear are computed as slow.
-TEST(CalibrateRecording, ASpeedOfAShearIsNamed) {
-  const Folder folder;
-  folder.write("skin.xml",
-               layout("modulus=\"2e5\" thickness=\"4e-3\" relaxation=\"0.02\" ks=\"40\" mu=\"1\""));
-  const auto err = [&](double speed) {
-    constexpr double kNormal = kPoints * 2.3 * 2e5 / kThickness * kArea * 5e-5;
-    folder.write("press.csv", table("time,depth_mm,force_N,shear,shear_force_N", 30, [=](int k) {
-                   const double shear = 4e-6 * k;
-                   return std::vector<double>{4e-6 * k / speed, 0.05, kNormal, shear,
-                                              std::min(kPoints * 40 * shear, 0.3 * kNormal)};
-                 }));
-    return run(folder, kFlat + Words{"--fit", "ks", "--fit", "mu"}).err;
-  };
-  EXPECT_THAT(err(1e-2), HasSubstr("a shear at 0.01 m/s and a relaxation of 0.02 s: 0.0002 m, "));
-  EXPECT_THAT(err(1e-5), Not(HasSubstr("a shear at")));
 }
 
 }  // namespace

@@ -103,19 +103,15 @@ TEST(FieldFit, FrictionIsThatOfTheFieldAlongTheSkin) {
     const PressPath path{
         .depth = r.depth, .rate = {}, .time = {}, .x = r.shear, .y = {}, .fields = true};
     r.points = kFieldPoints;
-    const Scene scene = request.scene(truth);
-    r.shear_field = shear_forces(scene, path);
-    r.field = press_forces(scene, path);
-    const std::vector<double> more = friction_shares(scene, path);
-    for (std::size_t k = 0; k < r.field.size(); ++k) r.field[k] += more[k];
+    const PathForces forces = path_forces(request.scene(truth), path);
+    r.field = forces.normal, r.shear_field = forces.tangential;
     std::mt19937 random(3);
     const double peak = *std::ranges::max_element(r.field);
     add_noise(r.field, 2e-3 * peak, random), add_noise(r.shear_field, 2e-3 * peak, random);
     const Calibration found = calibrate(request, r);
-    const double slack = found.friction.largest > 0.01 ? 0.1 : 0.01;  // fitted without friction
-    EXPECT_NEAR(found.found.at("modulus"), 2e5, slack * 2e5) << layer;
-    EXPECT_NEAR(found.found.at("ks"), 5e7, 0.05 * 5e7) << layer;
-    EXPECT_NEAR(found.found.at("mu"), 0.5, slack * 0.5) << layer;
+    EXPECT_NEAR(found.found.at("modulus"), 2e5, 0.005 * 2e5) << layer;
+    EXPECT_NEAR(found.found.at("ks"), 5e7, 0.02 * 5e7) << layer;
+    EXPECT_NEAR(found.found.at("mu"), 0.5, 0.005) << layer;
     EXPECT_LT(found.shear.root_mean_square, 0.02) << layer;
     EXPECT_GT(found.friction.mu, 0) << "the friction of a sheared path is named";
   }
