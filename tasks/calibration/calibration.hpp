@@ -83,10 +83,10 @@ std::vector<int> held_out_rows(double hold_out, int rows);
 
 /// Fits. Without a shear, normal forces give all numbers. With a shear, normal forces and those
 /// along the skin are fitted together, with friction; each kind counts by its own errors. Throws
-/// InputError for a recording without force, for a shear without any, for columns of unlike lengths,
-/// for times that do not ascend, for a path on which the sensor has no force, for a requested number
-/// that the columns cannot tell, for a table without a positive depth, and for errors of the depth
-/// of a field.
+/// InputError for a recording without force, for a shear without any, for columns of unlike
+/// lengths, for times that do not ascend, for a path on which the sensor has no force, for a
+/// requested number that the columns cannot tell, for a table without a positive depth, and for
+/// errors of the depth of a field.
 Calibration calibrate(const CalibrationRequest& request, const PressRecording& recording);
 
 /// Compares the normal forces of another recording with those of the numbers that were found, at

@@ -84,7 +84,7 @@ std::vector<double> DepthErrors::forces(const SkinNumbers& numbers) {
   std::vector<double> out = s.forces;
   if (error_.empty()) return out;
   for (std::size_t k = 0; k < out.size(); ++k) {
-    const ByRows by = by_rows(s, k);
+    const DepthSlopes by = slopes_at(s, k);
     for (std::size_t i = 0; i < by.row.size(); ++i)
       out[k] += by.slope[i] * error_[std::size_t(by.row[i])];
     out[k] -= s.bend[k] * left_variance(s, k / rows_.width) / 2;
@@ -94,10 +94,10 @@ std::vector<double> DepthErrors::forces(const SkinNumbers& numbers) {
 
 std::vector<double> DepthErrors::slopes(const SkinNumbers& numbers) { return at(numbers).depth; }
 
-DepthErrors::ByRows DepthErrors::by_rows(const Slopes& s, std::size_t force) const {
+DepthErrors::DepthSlopes DepthErrors::slopes_at(const Slopes& s, std::size_t force) const {
   const int row = int(force / rows_.width), last = int(recording_.rows()) - 1,
             before = std::max(row - 1, 0), after = std::min(row + 1, last);
-  ByRows out{{row, before, after}, {s.depth[force], 0, 0}};
+  DepthSlopes out{{row, before, after}, {s.depth[force], 0, 0}};
   if (rate_step_ > 0) {
     const double slope = s.rate[force] / (recording_.time[std::size_t(after)] -
                                           recording_.time[std::size_t(before)]);
@@ -106,7 +106,7 @@ DepthErrors::ByRows DepthErrors::by_rows(const Slopes& s, std::size_t force) con
   return out;
 }
 
-double DepthErrors::covariance(const ByRows& a, const ByRows& b) const {
+double DepthErrors::covariance(const DepthSlopes& a, const DepthSlopes& b) const {
   double sum = 0;
   for (std::size_t i = 0; i < a.row.size(); ++i)
     for (std::size_t j = 0; j < b.row.size(); ++j)
@@ -132,7 +132,7 @@ DepthErrors::Factor DepthErrors::factor(const Slopes& s) const {
   Factor out;
   out.band = 3 * rows_.width;  // of two rows before, and its own
   out.numbers.resize(n * out.band);
-  for (const std::size_t k : forces) out.by.push_back(by_rows(s, k));
+  for (const std::size_t k : forces) out.by.push_back(slopes_at(s, k));
   for (std::size_t i = 0; i < n; ++i) {
     const std::size_t first = i + 1 >= out.band ? i + 1 - out.band : 0;
     for (std::size_t j = first; j <= i; ++j) {
@@ -168,7 +168,7 @@ void DepthErrors::choose_errors(const SkinNumbers& numbers, const std::vector<do
     double sum = 0;
     for (const std::size_t k : fitted()) {
       if (kind(k) != part) continue;
-      const ByRows by = by_rows(s, k);
+      const DepthSlopes by = slopes_at(s, k);
       squares.push_back(off[k] * off[k]), variances.push_back(covariance(by, by));
       sum += squares.back();
     }
@@ -197,7 +197,7 @@ double DepthErrors::size(const SkinNumbers& numbers) {
   double sum = 0, count = 0;
   for (const std::size_t k : fitted()) {
     if (kind(k) != 0) continue;
-    const ByRows by = by_rows(s, k);
+    const DepthSlopes by = slopes_at(s, k);
     sum += covariance(by, by), count += 1;
   }
   return count > 0 ? std::sqrt(sum / count) : 0;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Errors of recorded depths in a fit of forces (docs/calibration.md#errors-of-the-depth). A depth
-// that is off by e moves the force F that is computed at it by F' e, and with relaxation it moves the
-// rates of its neighbours. With independent e of the deviation σ_d, differences to recorded forces
-// have the covariance
+// that is off by e moves the force F that is computed at it by F' e, and with relaxation it moves
+// the rates of its neighbours. With independent e of the deviation σ_d, differences to recorded
+// forces have the covariance
 //   C = σ_F² I + σ_d² B Bᵀ
 // σ_F is that of forces along the normal or along the skin, and column j of B has the slopes of all
 // forces by the depth of row j. Forces are linear around depths d - ê from which the likely errors
@@ -60,20 +60,20 @@ class DepthErrors {
     bool set = false;
   };
   /// A force's slopes by the depths of a row and of those before and after it.
-  struct ByRows {
+  struct DepthSlopes {
     std::array<int, 3> row;
     std::array<double, 3> slope;
   };
   const Slopes& at(const SkinNumbers& numbers);
-  [[nodiscard]] ByRows by_rows(const Slopes& s, std::size_t force) const;
+  [[nodiscard]] DepthSlopes slopes_at(const Slopes& s, std::size_t force) const;
   [[nodiscard]] std::size_t kind(std::size_t force) const;
-  [[nodiscard]] double covariance(const ByRows& a, const ByRows& b) const;
+  [[nodiscard]] double covariance(const DepthSlopes& a, const DepthSlopes& b) const;
   [[nodiscard]] std::vector<std::size_t> fitted() const;
   [[nodiscard]] double left_variance(const Slopes& s, std::size_t row) const;
   struct Factor {
     std::size_t band = 0;
     std::vector<double> numbers;  ///< (n, band): L at i, i - band + 1 …
-    std::vector<ByRows> by;
+    std::vector<DepthSlopes> by;
     double& at(std::size_t i, std::size_t j) { return numbers[i * band + (j + band - 1 - i)]; }
   };
   [[nodiscard]] Factor factor(const Slopes& s) const;

@@ -46,9 +46,9 @@ struct ErrorModel {
 /// s² (JᵀJ)⁻¹ with s² = Σ r²/(m - rank J), on the directions of x that change the residuals. The
 /// others are not told, and none is without more residuals than that rank. Residuals b of two
 /// variances have s_b² = Σ_b r²/(m_b - tr H_b) each, H_b = J_b (JᵀJ)⁻¹ J_bᵀ, and the covariance
-/// Σ_b s_b² (JᵀJ)⁻¹ J_bᵀJ_b (JᵀJ)⁻¹. Where errors of a row may be alike, the covariance is also that
-/// of whole rows g, n/(n - rank J) Σ_g (JᵀJ)⁻¹ J_gᵀ r_g r_gᵀ J_g (JᵀJ)⁻¹ with n rows, and the larger
-/// counts.
+/// Σ_b s_b² (JᵀJ)⁻¹ J_bᵀJ_b (JᵀJ)⁻¹. Where errors of a row may be alike, the covariance is also
+/// that of whole rows g, n/(n - rank J) Σ_g (JᵀJ)⁻¹ J_gᵀ r_g r_gᵀ J_g (JᵀJ)⁻¹ with n rows, and the
+/// larger counts.
 class Confidence {
  public:
   Confidence() = default;

@@ -41,8 +41,8 @@ struct PressRecording {
   /// Returns the rate of the depth [m/s] by differences between neighbours; zeros without times.
   [[nodiscard]] std::vector<double> rates() const;
   /// Returns the rows at which the rate of the depth or of the shear jumps by more than a fifth of
-  /// its largest size, so that it is not known there, or by more than half where the former are more
-  /// than a fifth of the rows; none where these are, too, and none without times. Ascending.
+  /// its largest size, so that it is not known there, or by more than half where the former are
+  /// more than a fifth of the rows; none where these are, too, and none without times. Ascending.
   [[nodiscard]] std::vector<int> turns() const;
   /// Returns the standard deviation of the errors of evenly spaced depths [m], by third differences
   /// between turns, which a smooth motion has hardly: of normal errors σ their median size is

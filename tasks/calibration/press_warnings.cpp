@@ -259,9 +259,8 @@ std::vector<std::string> skin_warnings(const Scene& scene, const Scene& layout,
           ? fmt::format("a skin of {:.3g} {}, {:.2g} times the {:.3g} of the layout", value, what,
                         value / usual, usual)
           : fmt::format("a skin of {:.3g} {}; expected {:.0e} to {:.0e}", value, what, low, high);
-  for (std::size_t k = 0; k < units.size(); ++k)
-    if (k == 0 || off(units[k]) < off(units[0]) + kNearDecades)
-      text += fmt::format("; {:.3g} if forces are {}", value * units[k].factor, units[k].name);
+  for (const ForceUnit& unit : units)
+    text += fmt::format("; {:.3g} if forces are {}", value * unit.factor, unit.name);
   return {text};
 }
 

@@ -43,7 +43,8 @@ std::vector<std::vector<double>> shifted_forces(const SkinScene& scene,
                                                 std::span<const DepthShift> shifts);
 
 /// Computes what normal() and tangential() compare, with friction along the path of the rows, with
-/// their times if there are any [N]. A shift of the rate leaves it as it is. Throws as path_forces().
+/// their times if there are any [N]. A shift of the rate leaves it as it is. Throws as
+/// path_forces().
 PathForces sheared_forces(const SkinScene& scene, const PressRecording& recording,
                           const SkinNumbers& numbers, const DepthShift& shift = {});
 

@@ -348,18 +348,31 @@ TEST(CalibrateRecording, WhatRatesDoIsNamed) {
   const Folder folder;
   folder.write("skin.xml", layout("modulus=\"1e5\" thickness=\"4e-3\" mu=\"0\""));
   constexpr double kTau = 0.02, kFilm = 2.3 * 2e5 / kThickness * kArea;
-  const auto err = [&](double step, double noise) {
+  // `follow`: whether forces are those of the noisy depths.
+  const auto write = [&](double step, double noise, bool follow) {
     folder.write("press.csv", table("time,depth,force", 41, [=](int k) {
                    const double rate = 5e-6 / step * (k <= 20 ? 2 : -1),
-                                d = 5e-6 * (k <= 20 ? 2 * k : 60 - k) + 1e-5;
-                   return std::vector<double>{step * k, d + noise * std::sin(2.5 * k * k),
-                                              kPoints * kFilm * d * (1 + kTau * rate / 4e-4)};
+                                d = 5e-6 * (k <= 20 ? 2 * k : 60 - k) + 1e-5,
+                                noisy = d + noise * std::sin(2.5 * k * k);
+                   return std::vector<double>{
+                       step * k, noisy,
+                       kPoints * kFilm * (follow ? noisy : d) * (1 + kTau * rate / 4e-4)};
                  }));
-    return run(folder, kFlat).err;
+    return run(folder, kFlat);
   };
-  EXPECT_EQ(err(1e-3, 0), "");
-  EXPECT_THAT(err(0.03, 0), HasSubstr("rows are 0.03 s apart, longer than the relaxation of 0.02"));
-  EXPECT_THAT(err(1e-3, 2e-6), HasSubstr("the intervals do not contain errors of the depth"));
+  EXPECT_EQ(write(1e-3, 0, true).err, "");
+  EXPECT_THAT(write(0.03, 0, true).err,
+              HasSubstr("rows are 0.03 s apart, longer than the relaxation of 0.02"));
+  EXPECT_THAT(write(1e-3, 2e-6, true).err,
+              HasSubstr("the intervals do not contain errors of the depth"));
+  const Outcome noisy = write(1e-3, 2e-6, false);
+  EXPECT_EQ(noisy.err, "");
+  EXPECT_THAT(noisy.out, HasSubstr("m, by the scatter of depths and forces, contained in the fit"));
+  const json given = run_json(folder, kFlat + Words{"--depth-error", "3e-6"});
+  EXPECT_EQ(given["depth_error"]["deviation"], 3e-6);
+  EXPECT_EQ(given["depth_error"]["estimated"], false);
+  EXPECT_THAT(run(folder, kFlat + Words{"--depth-error", "-1"}).err,
+              HasSubstr("--depth-error -1; expected the standard deviation"));
 }
 
 }  // namespace

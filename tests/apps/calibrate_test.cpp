@@ -234,7 +234,7 @@ TEST(Calibrate, AShearedGelOfFiniteElementsIsFound) {
   const json answer =
       run_json(folder, {"calibrate", "shear.csv", "--sensor", "gel.xml", "--ball", "0.0075",
                         "--fit", "modulus", "--fit", "ks", "--hold-out", "1"});
-  EXPECT_NEAR(number(answer, "modulus")["value"], 4.28e5, 0.015 * 4.28e5);
+  EXPECT_NEAR(number(answer, "modulus")["value"], 4.28e5, 0.025 * 4.28e5);
   EXPECT_LT(answer["normal_held_out"]["largest"], 0.01);
   EXPECT_LT(answer["shear_held_out"]["largest"], 0.04);
 }
