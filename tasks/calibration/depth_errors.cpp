@@ -9,7 +9,8 @@
 namespace tangere {
 namespace {
 
-constexpr double kLeastForceError = 1e-3;  // σ_F, by the deviation of a fit without these errors
+constexpr double kLeastForceError = 0.1;  // σ_F, by the deviation of a fit without these errors
+constexpr double kLeastFactor = 0.01, kMostFactor = 10;  // of σ_F
 constexpr int kHalvings = 60;
 constexpr double kAgrees = 4;     // factor between two estimates of σ_d²
 constexpr double kMatters = 0.2;  // of the forces' errors
@@ -160,9 +161,25 @@ std::vector<double> DepthErrors::whitened(const SkinNumbers& numbers,
   return out;
 }
 
+/// Multiplies σ_F of both kinds of forces so that Σ (L⁻¹ r)² is `freedom`, or nearest to it.
+void DepthErrors::scale_force_errors(const SkinNumbers& numbers, const std::vector<double>& off,
+                                     double freedom) {
+  const std::array<double, 2> before = force_error_;
+  double low = std::log(kLeastFactor), high = std::log(kMostFactor);
+  for (int k = 0; k < kHalvings / 2; ++k) {
+    const double middle = (low + high) / 2;
+    for (std::size_t part = 0; part < before.size(); ++part)
+      force_error_[part] = std::exp(middle) * before[part];
+    double sum = 0;
+    for (const double x : whitened(numbers, off)) sum += x * x;
+    (sum > freedom ? low : high) = middle;
+  }
+}
+
 void DepthErrors::choose_errors(const SkinNumbers& numbers, const std::vector<double>& off,
                                 const std::array<double, 2>& deviations) {
   const Slopes& s = at(numbers);
+  double freedom = 0;
   for (std::size_t part = 0; part < force_error_.size(); ++part) {
     std::vector<double> squares, variances;
     double sum = 0;
@@ -174,8 +191,10 @@ void DepthErrors::choose_errors(const SkinNumbers& numbers, const std::vector<do
     }
     const double most = deviations[part];
     if (squares.empty() || !(most > 0)) continue;
+    freedom += sum / (most * most);
     force_error_[part] = left_error(squares, variances, sum / (most * most), most);
   }
+  scale_force_errors(numbers, off, freedom);
   Factor of = factor(s);
   std::vector<double> solved = whitened(numbers, off);  // then C⁻¹ r
   for (std::size_t i = solved.size(); i-- > 0;) {

@@ -70,6 +70,8 @@ class DepthErrors {
   [[nodiscard]] double covariance(const DepthSlopes& a, const DepthSlopes& b) const;
   [[nodiscard]] std::vector<std::size_t> fitted() const;
   [[nodiscard]] double left_variance(const Slopes& s, std::size_t row) const;
+  void scale_force_errors(const SkinNumbers& numbers, const std::vector<double>& off,
+                          double freedom);
   struct Factor {
     std::size_t band = 0;
     std::vector<double> numbers;  ///< (n, band): L at i, i - band + 1 …
