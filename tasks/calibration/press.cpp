@@ -95,6 +95,30 @@ std::vector<double> PressRecording::rates() const {
 
 namespace {
 
+constexpr std::size_t kFewestDifferencesOfRows = 12;  // of which a scatter is estimated
+
+/// Standard deviation of the errors of evenly spaced numbers, by their third differences, which a
+/// smooth motion has hardly: of normal errors σ the median size of these is 0.6745 √20 σ.
+double scatter_of(std::vector<double> third) {
+  constexpr double kOfNormal = 0.674490;
+  const auto middle = third.begin() + std::ssize(third) / 2;
+  std::ranges::nth_element(third, middle);
+  return *middle / (kOfNormal * std::sqrt(20.0));
+}
+
+double third_difference(std::span<const double> x, std::size_t last) {
+  return std::abs(x[last] - 3 * x[last - 1] + 3 * x[last - 2] - x[last - 3]);
+}
+
+/// Returns by how much differences of neighbouring rates scatter, as multiples of steps of time.
+double jump_scatter(std::span<const double> column) {
+  constexpr double kDeviations = 4;
+  std::vector<double> third;
+  for (std::size_t k = 3; k < column.size(); ++k) third.push_back(third_difference(column, k));
+  if (third.size() < kFewestDifferencesOfRows) return 0;
+  return kDeviations * std::sqrt(6.0) * scatter_of(std::move(third));
+}
+
 /// Returns the rows at which the rate of a column jumps (PressRecording::turns()).
 std::vector<int> jumps_of(std::span<const double> column, std::span<const double> time) {
   constexpr double kJumps[] = {0.2, 0.5}, kMostTurns = 0.2;
@@ -104,10 +128,12 @@ std::vector<int> jumps_of(std::span<const double> column, std::span<const double
     rate.push_back((column[k] - column[k - 1]) / (time[k] - time[k - 1]));
     largest = std::max(largest, std::abs(rate.back()));
   }
+  const double span = time.empty() ? 0 : time.back() - time.front(),
+               noise = span > 0 ? jump_scatter(column) * double(rate.size()) / span : 0;
   for (const double jump : kJumps) {
     std::vector<int> out;
     for (std::size_t k = 1; k < rate.size(); ++k)
-      if (std::abs(rate[k] - rate[k - 1]) > jump * largest) out.push_back(int(k));
+      if (std::abs(rate[k] - rate[k - 1]) > std::max(jump * largest, noise)) out.push_back(int(k));
     if (double(out.size()) <= kMostTurns * double(column.size())) return out;
   }
   return {};
@@ -123,9 +149,7 @@ std::vector<int> PressRecording::turns() const {
 }
 
 double PressRecording::depth_scatter() const {
-  constexpr std::size_t kFewest = 12;     // differences
-  constexpr double kEven = 0.05;          // steps of time, by their mean
-  constexpr double kOfNormal = 0.674490;  // median of |x|, by the deviation
+  constexpr double kEven = 0.05;  // steps of time, by their mean
   const double step = time.size() > 1 ? (time.back() - time.front()) / double(rows() - 1) : 0;
   for (std::size_t k = 1; k < time.size(); ++k)
     if (std::abs(time[k] - time[k - 1] - step) > kEven * step) return 0;
@@ -134,13 +158,9 @@ double PressRecording::depth_scatter() const {
   for (int k = 3; k < int(rows()); ++k) {
     const auto turn = std::ranges::upper_bound(turning, k - 3);
     if (turn != turning.end() && *turn < k) continue;
-    const double* const d = &depth[std::size_t(k - 3)];
-    third.push_back(std::abs(d[3] - 3 * d[2] + 3 * d[1] - d[0]));
+    third.push_back(third_difference(depth, std::size_t(k)));
   }
-  if (third.size() < kFewest) return 0;
-  const auto middle = third.begin() + std::ssize(third) / 2;
-  std::ranges::nth_element(third, middle);
-  return *middle / (kOfNormal * std::sqrt(20.0));
+  return third.size() < kFewestDifferencesOfRows ? 0 : scatter_of(std::move(third));
 }
 
 Scene placed_indenter(const Scene& scene) {

@@ -42,11 +42,12 @@ struct PressRecording {
   [[nodiscard]] std::vector<double> rates() const;
   /// Returns the rows at which the rate of the depth or of the shear jumps by more than a fifth of
   /// its largest size, so that it is not known there, or by more than half where the former are
-  /// more than a fifth of the rows; none where these are, too, and none without times. Ascending.
+  /// more than a fifth of the rows; none where these are, too, and none without times. Jumps within
+  /// four deviations of the scatter of third differences are none. Ascending.
   [[nodiscard]] std::vector<int> turns() const;
   /// Returns the standard deviation of the errors of evenly spaced depths [m], by third differences
-  /// between turns, which a smooth motion has hardly: of normal errors σ their median size is
-  /// 0.6745 √20 σ. 0 for times that are not even, and for few rows.
+  /// between turns, which a smooth motion has hardly. 0 for times that are not even, and for few
+  /// rows.
   [[nodiscard]] double depth_scatter() const;
 };
 
