@@ -84,6 +84,7 @@ Json work_json(const Job& job, const EpisodeSummary& summary) {
             {"environment_steps_per_second", rate_of(summary)},
             {"newton_iterations", summary.counts.newton_iterations}};
   json.update(split_json(summary.counts));
+  json["loads_not_carried"] = summary.counts.loads_not_carried;
   json["mean_asleep"] = mean_asleep(job.layout.sleep, summary.counts);
   return json;
 }

@@ -59,8 +59,7 @@ Json split_json(const StepCounts& counts) {
           {"accuracy_not_met_steps", counts.accuracy_not_met_steps},
           {"tunnelled_steps", counts.tunnelled_steps},
           {"damped_steps", counts.damped_steps},
-          {"overlapping_steps", counts.overlapping_steps},
-          {"loads_not_carried", counts.loads_not_carried}};
+          {"overlapping_steps", counts.overlapping_steps}};
 }
 
 Json steps_json(const std::optional<EpisodeSteps>& steps) {

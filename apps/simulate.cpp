@@ -165,6 +165,7 @@ int report(const SimulateArguments& options, const Console& console, const Batch
                  {"newton_iterations", summary.counts.newton_iterations},
                  {"newton_iterations_per_step", per_step}});
   result.update(split_json(summary.counts));
+  result["loads_not_carried"] = summary.counts.loads_not_carried;
   result.update({{"mean_asleep", mean_asleep(facts.sleep, summary.counts)},
                  {"costly", costly},
                  {"audit", audit_json(summary.audit)},
