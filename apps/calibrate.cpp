@@ -365,6 +365,18 @@ std::string untold_text(const Calibration& found) {
 }
 
 /// Refuses an output that would be the layout as it is.
+/// Refuses errors that are no small part of the depths: forces are taken as smooth over them.
+void check_depth_error(const CalibrateArguments& a, const PressRecording& recording) {
+  constexpr double kMost = 0.1;
+  if (!(a.depth_error > 0) || recording.depth.empty()) return;
+  const auto [low, high] = std::ranges::minmax(recording.depth);
+  if (const double most = kMost * (high - low); !(a.depth_error <= most))
+    throw InputError(fmt::format(
+        "--depth-error {}; expected metres, a tenth of the range of the recorded depths at most, "
+        "{:.3g}",
+        a.depth_error, most));
+}
+
 void check_output(const CalibrateArguments& a, const Fitted& fitted) {
   if (a.output.empty() || fits_layout(a, !fitted.has_table)) return;
   if (a.numbers.empty())
@@ -409,6 +421,7 @@ int run_calibrate(const CalibrateArguments& a, const Console& console) {
       .friction = a.friction,
       .depth_error = std::isnan(a.depth_error) ? std::nullopt : std::optional(a.depth_error),
       .hold_out = a.hold_out.value_or(0)};
+  check_depth_error(a, recording);
   const Scene own = press_scene(fitted.own_layout, a.indenter);
   std::vector<std::string> warnings = press_warnings(own, recording);
   warn(warnings, 0, a.recording, console);
@@ -426,6 +439,8 @@ int run_calibrate(const CalibrateArguments& a, const Console& console) {
   const std::size_t said = warnings.size();
   const Scene skin = press_scene(written.layout, a.indenter);
   std::ranges::copy(skin_warnings(skin, own, recording), std::back_inserter(warnings));
+  if (is_fitted(found, kFriction))
+    std::ranges::copy(friction_warnings(skin), std::back_inserter(warnings));
   if (is_fitted(found, kRelaxation) || is_fitted(found, kShear) || is_fitted(found, kFriction))
     std::ranges::copy(
         rate_warnings(skin, recording, !std::isnan(a.depth_error) || found.depth_error.estimated),

@@ -18,7 +18,8 @@ constexpr double kMoreReach = 1.25;  // of a reach that grows
 constexpr double kExact = 2e-14, kResidual = 5e-13;  // residuals by the loads
 constexpr double kSingular = 1e-9, kLift = 1e-6;     // pivots by the trace, and what is added then
 constexpr double kAtEnd = 1e-12;                     // relative, of an end
-constexpr int kMostSteps = 80, kMostTrials = 30;
+constexpr double kRoundedShare = 2e-15;              // of slopes times approach
+constexpr int kMostSteps = 400, kMostTrials = 30;
 
 double size_of(const std::array<double, 3>& a) {
   return std::abs(a[0]) + std::abs(a[1]) + std::abs(a[2]);
@@ -228,11 +229,13 @@ void LoadControl::solve(const CompiledLayer& layer, double modulus, const PadLoa
     choose_ends();
     const double now = largest_residual();
     find_slopes();
-    if (now <= kExact * load || (now <= kResidual * load && now > 0.5 * last)) break;
-    if (!law.solved() || k + 1 == kMostSteps) {
-      solved_ = false;
-      return;
-    }
+    // Depths of the size of the approach are rounded, and forces change by slopes times that.
+    const double rounding =
+        kRoundedShare * (slopes_[0][0] + slopes_[1][1] + slopes_[2][2]) * size_of(approach_);
+    if (now <= kExact * load) break;
+    if (now <= std::max(kResidual * load, rounding) && now > 0.5 * last) break;
+    solved_ = law.solved();
+    if (!solved_ || k + 1 == kMostSteps) return;
     last = now;
     step(direction());
   }

@@ -40,9 +40,10 @@ class LoadControl {
   /// Solves `law` with E = `modulus` [Pa] for the depths at which it carries `loads`.
   void solve(const CompiledLayer& layer, double modulus, const PadLoads& loads,
              const Points& points, GelLayer& law);
-  /// Whether shift and tilts were found.
+  /// Whether the pressures were found, of the last shift and tilts.
   [[nodiscard]] bool solved() const { return solved_; }
-  /// Whether the layer carries all loads. Else a shift or a tilt is at its end, or nothing presses.
+  /// Whether the layer carries all loads. Else a shift or a tilt is at its end, nothing presses, or
+  /// shift and tilts were not found in all steps of Newton's method.
   [[nodiscard]] bool carries() const { return carries_; }
 
   /// Returns x·b of a point.

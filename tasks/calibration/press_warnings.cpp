@@ -14,14 +14,15 @@ namespace tangere {
 namespace {
 
 constexpr double kLargestBall = 0.1, kLargestFlat = 0.3, kSmallestEnd = 1e-4;  // [m]
-constexpr double kLargestByPad = 3;                         // radius, by the pad's longer side
-constexpr double kDeepestPress = 0.05, kShallowest = 5e-6;  // [m], without a thickness
-constexpr double kFastestPress = 2;                         // [m/s]
-constexpr double kLeastModulus = 5e3, kMostModulus = 2e7;   // of skins [Pa]
-constexpr double kSoftest = 5e5, kStiffest = 5e10;          // by area, without a thickness [N/m³]
-constexpr double kFarDecades = 2, kNearDecades = 0.5;       // from the layout's, as powers of 10
-constexpr double kFilm = 2.3;                               // kn t/E of a film (docs/skin.md)
-constexpr double kCellError = 0.09, kMostCellError = 0.04;  // h/√(R d) has this error of a force
+constexpr double kLargestByPad = 3;                          // radius, by the pad's longer side
+constexpr double kDeepestPress = 0.05, kShallowest = 5e-6;   // [m], without a thickness
+constexpr double kFastestPress = 2;                          // [m/s]
+constexpr double kLeastFriction = 0.02, kMostFriction = 10;  // of skins
+constexpr double kLeastModulus = 5e3, kMostModulus = 2e7;    // of skins [Pa]
+constexpr double kSoftest = 5e5, kStiffest = 5e10;           // by area, without a thickness [N/m³]
+constexpr double kFarDecades = 2, kNearDecades = 0.5;        // from the layout's, as powers of 10
+constexpr double kFilm = 2.3;                                // kn t/E of a film (docs/skin.md)
+constexpr double kCellError = 0.09, kMostCellError = 0.04;   // h/√(R d) has this error of a force
 constexpr int kFewestPoints = 9;
 constexpr double kNoisyRate = 0.05;      // error of a rate, of the largest
 constexpr double kUsualLayerCell = 0.2;  // of a layer, by the thickness
@@ -147,6 +148,27 @@ void warn_of_speed(const PressRecording& r, std::vector<std::string>& out) {
                                                : "times or depths are 1000 times off")));
 }
 
+void warn_of_shear(const PressRecording& r, double side, std::vector<std::string>& out) {
+  if (r.shear.empty()) return;
+  const auto size = [](double x) { return std::abs(x); };
+  const auto farthest = std::size_t(std::ranges::max_element(r.shear, {}, size) - r.shear.begin());
+  const double shear = size(r.shear[farthest]), most = kLargestByPad * side;
+  if (shear > most)
+    out.push_back(
+        place_text(r, farthest) +
+        fmt::format("a shear of {:.4g} m; expected metres, {:.3g} at most, three times the "
+                    "pad{}",
+                    shear, most,
+                    shear * 1e-3 < most
+                        ? factor_text(shear, 1e-3, "the column is in mm: name it shear_mm")
+                        : ""));
+  if (shear > 0 && shear < kShallowest)
+    out.push_back(
+        place_text(r, farthest) +
+        fmt::format("a largest shear of {:.3g} m; expected {:.3g} at least{}", shear, kShallowest,
+                    factor_text(shear, 1e3, "it was divided by 1000: multiply it by 1000")));
+}
+
 /// Whether points and cells are fine enough for the deepest row.
 void warn_of_resolution(const TactileDescription& d, double ball, double depth,
                         const Places& places, std::vector<std::string>& out) {
@@ -229,8 +251,21 @@ std::vector<std::string> press_warnings(const Scene& scene, const PressRecording
   warn_of_size(scene, places, out);
   warn_of_depth(r, thickness_of(scene.sensors[0]), out);
   warn_of_speed(r, out);
+  warn_of_shear(r, places.side, out);
   if (ball && out.empty()) warn_of_resolution(scene.sensors[0], *ball, depth, places, out);
   return out;
+}
+
+std::vector<std::string> friction_warnings(const Scene& scene) {
+  const double mu = scene.sensors.at(0).coefficients.mu;
+  if (mu >= kLeastFriction && mu <= kMostFriction) return {};
+  return {
+      fmt::format("a friction of {:.3g}; expected {} to {}. Compare the units of shear_force and "
+                  "force, and that "
+                  "of shear: in mN a force is 1000 times too large (name it shear_force_mN), in kN "
+                  "it is as much "
+                  "too small",
+                  mu, kLeastFriction, kMostFriction)};
 }
 
 std::vector<std::string> skin_warnings(const Scene& scene, const Scene& layout,

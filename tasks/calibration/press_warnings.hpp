@@ -16,6 +16,9 @@ namespace tangere {
 /// `scene`: of placed_indenter().
 std::vector<std::string> press_warnings(const Scene& scene, const PressRecording& recording);
 
+/// Returns what makes a fitted friction of a layout's scene unlikely.
+std::vector<std::string> friction_warnings(const Scene& scene);
+
 /// Returns what is implausible about a skin that was fitted to a recording: a stiffness that no
 /// skin has, or one that is more than 100 times that of the layout or less than a hundredth, where
 /// another unit of the forces leads back to the layout's within a factor of 3. The unit is named:
