@@ -347,6 +347,17 @@ std::string misfit_text(const Calibration& found) {
       percent(kMuchOfNorm));
 }
 
+/// The same of a shear; it is zero without one.
+std::string shear_misfit_text(const Calibration& found) {
+  constexpr double kMuch = 0.3;
+  const double left = found.shear.root_mean_square;
+  if (found.numbers.empty() || !(left > kMuch)) return "";
+  return fmt::format(
+      "the fit leaves {} of the peak of the forces along the skin; expected {} at most: units of "
+      "shear_force or shear that are not those of force and depth, or another direction",
+      percent(left), percent(kMuch));
+}
+
 bool is_fitted(const Calibration& found, const char* name) {
   return std::ranges::count(found.numbers, name, &FittedNumber::name) > 0;
 }
@@ -364,7 +375,6 @@ std::string untold_text(const Calibration& found) {
   return reasons.empty() ? "" : fmt::format(" ({})", fmt::join(reasons, "; "));
 }
 
-/// Refuses an output that would be the layout as it is.
 /// Refuses errors that are no small part of the depths: forces are taken as smooth over them.
 void check_depth_error(const CalibrateArguments& a, const PressRecording& recording) {
   constexpr double kMost = 0.1;
@@ -377,6 +387,7 @@ void check_depth_error(const CalibrateArguments& a, const PressRecording& record
         a.depth_error, most));
 }
 
+/// Refuses an output that would be the layout as it is.
 void check_output(const CalibrateArguments& a, const Fitted& fitted) {
   if (a.output.empty() || fits_layout(a, !fitted.has_table)) return;
   if (a.numbers.empty())
@@ -445,7 +456,8 @@ int run_calibrate(const CalibrateArguments& a, const Console& console) {
     std::ranges::copy(
         rate_warnings(skin, recording, !std::isnan(a.depth_error) || found.depth_error.estimated),
         std::back_inserter(warnings));
-  if (const std::string misfit = misfit_text(found); !misfit.empty()) warnings.push_back(misfit);
+  for (const std::string& misfit : {misfit_text(found), shear_misfit_text(found)})
+    if (!misfit.empty()) warnings.push_back(misfit);
   if (const std::string level = level_text(skin); fitted.knots > 0 && !level.empty())
     warnings.push_back(level);
   warn(warnings, said, a.recording, console);

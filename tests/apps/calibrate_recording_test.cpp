@@ -147,6 +147,24 @@ TEST(CalibrateRecording, AShearOfTheOtherSignIsRefused) {
   }
 }
 
+TEST(CalibrateRecording, ImplausibleShearsAreNamed) {
+  const Folder folder;
+  folder.write("skin.xml", layout("kn=\"100\" ks=\"40\" mu=\"1\""));
+  const auto shear = [&](const char* header, double length, double force) {
+    folder.write("press.csv", table(header, 60, [=](int k) {
+                   return std::vector<double>{0.05, 0.185, 2e-3 * k * length,
+                                              force * std::min(kPoints * 40 * 2e-6 * k, 0.055)};
+                 }));
+    return run(folder, kFlat).err;
+  };
+  const char* const all_mm = "depth_mm,force_N,shear_mm,shear_force_N";
+  EXPECT_EQ(shear(all_mm, 1, 1), "");
+  EXPECT_THAT(shear("depth_mm,force_N,shear,shear_force_N", 1, 1),
+              HasSubstr("if the column is in mm: name it shear_mm"));
+  EXPECT_THAT(shear(all_mm, 1e-3, 1), HasSubstr("a largest shear of 1.18e-07 m; expected 5e-06"));
+  EXPECT_THAT(shear(all_mm, 1, 1e3), HasSubstr("a friction of "));
+}
+
 TEST(CalibrateRecording, ImplausibleUnitsAreNamed) {
   const Folder folder;
   folder.write("skin.xml", layout("modulus=\"2e5\" thickness=\"4e-3\" mu=\"0\""));
@@ -373,6 +391,8 @@ TEST(CalibrateRecording, WhatRatesDoIsNamed) {
   EXPECT_EQ(given["depth_error"]["estimated"], false);
   EXPECT_THAT(run(folder, kFlat + Words{"--depth-error", "-1"}).err,
               HasSubstr("--depth-error -1; expected the standard deviation"));
+  EXPECT_THAT(run(folder, kFlat + Words{"--depth-error", "5"}).err,
+              HasSubstr("--depth-error 5; expected metres, a tenth of the range"));
 }
 
 }  // namespace

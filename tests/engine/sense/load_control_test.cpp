@@ -183,6 +183,38 @@ TEST(LoadControl, WhatNoPointCanCarryIsCounted) {
   EXPECT_EQ(other.loads_not_carried(), 1);
 }
 
+/// A small ball that slides with much friction: where shift and tilts are not found, the field is
+/// finite and the reading counts; elsewhere it has the force.
+TEST(LoadControl, EveryReadingIsFinite) {
+  LoadScene s;
+  s.body = R"(type="sphere" radius="0.002")";
+  s.start = "0 0 0.002";
+  s.contact = R"(<surface_contact body1="ball" body2="table" kn="4e7" kt="2e5" mu="3"/>)";
+  s.skin = R"(mu="3" ks="0" kt="4e7")";
+  const Model model(parsed(gel_on_a_hinge(s)));
+  Batch batch(model, 1);
+  Readout readout(model);
+  Numbers q = testing::q_of(batch), v(std::size_t(model.nv())),
+          field(std::size_t(3 * model.sensors()[0].points));
+  const auto share = [](int k, double step) { return std::fmod(k * step, 1.0) - 0.5; };
+  int carried = 0;
+  for (int k = 0; k < 150; ++k) {
+    q[1] = 0.012 * share(k, 0.618034), q[2] = 0.012 * share(k, 0.414214);
+    q[3] = -3e-4 + 4e-4 * share(k, 0.732051);
+    for (std::size_t i = 1; i < v.size(); ++i) v[i] = 0.2 * share(k, 0.236068 * double(i));
+    batch.set_state(0, q, v);
+    const std::int64_t before = readout.loads_not_carried();
+    readout.tactile(batch, 0, 0, field);
+    for (const double x : field) ASSERT_TRUE(std::isfinite(x)) << k;
+    if (readout.loads_not_carried() > before) continue;
+    const double wanted = loads_by_kernels(batch)[0];
+    EXPECT_NEAR(loads_in_field(model, field)[0], wanted, 1e-12 * wanted) << k;
+    if (wanted > 0) ++carried;
+  }
+  EXPECT_GT(carried, 20);
+  EXPECT_GT(readout.loads_not_carried(), 0);
+}
+
 /// Loads that change little by little change the field little by little: also where a tilt ends.
 TEST(LoadControl, TheFieldIsContinuous) {
   LoadScene s;
