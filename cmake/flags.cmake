@@ -39,8 +39,8 @@ if(TANGERE_SANITIZE)
   target_compile_options(tangere_flags INTERFACE
     -fsanitize=${TANGERE_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all -fno-sanitize=vptr)
   target_link_options(tangere_flags INTERFACE -fsanitize=${TANGERE_SANITIZE})
-  # Whether an address wraps or points beyond an object: the address sanitizer stops at the access itself. These two
-  # checks take a third of the compile time of kernels and a fifth of that of io.
+  # Whether an address wraps or points beyond an object: the address sanitizer stops at the access
+  # itself. These two checks take a third of the compile time of kernels and a fifth of that of io.
   if(TANGERE_SANITIZE MATCHES "undefined" AND TANGERE_SANITIZE MATCHES "address")
     target_compile_options(tangere_flags INTERFACE -fno-sanitize=pointer-overflow,object-size)
   endif()
