@@ -3,13 +3,17 @@
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import dataclasses
 import importlib
+import io
 import json
+import runpy
 import shutil
 import subprocess
 import sys
+import unittest.mock
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -37,12 +41,12 @@ import tangere.torch  # noqa: E402
 
 
 def run(program: str, *arguments: str) -> dict:
-    """What a program prints with --json."""
-    done = subprocess.run(
-        [sys.executable, str(LEARNING / program), *arguments, "--json"],
-        check=True, capture_output=True, text=True,
-    )  # fmt: skip
-    return json.loads(done.stdout)
+    """What a program prints with --json. It runs here: PyTorch is imported once."""
+    path, printed = LEARNING / program, io.StringIO()
+    words = [str(path), *arguments, "--json"]
+    with unittest.mock.patch.object(sys, "argv", words), contextlib.redirect_stdout(printed):
+        runpy.run_path(str(path), run_name="__main__")
+    return json.loads(printed.getvalue())
 
 
 @pytest.mark.parametrize("memory", [["--no-recurrent"], ["--recurrent", "--last_gamma", "0.995"]])

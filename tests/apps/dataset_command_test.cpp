@@ -11,7 +11,6 @@
 
 #include "io/hdf5/h5_listing.hpp"
 #include "tests/apps/program.hpp"
-#include "tests/sanitized.hpp"
 
 namespace tangere::apps {
 namespace {
@@ -218,35 +217,6 @@ TEST_F(DatasetCommand, NextObservationsThatAreNotThoseOfTheNextRowAreAProblem) {
   EXPECT_THAT(
       answer({"validate", "set/robomimic.hdf5"}, 3).at("problems").get<Words>(),
       ElementsAre(HasSubstr("demo_3: next_obs/q is not obs one row later, in rows 0 to 2")));
-}
-
-TEST_F(DatasetCommand, MergedFilesGrowByTheSameForEachEpisode) {
-  std::vector<double> robomimic, minari;
-  double memory = 0;
-  for (const int episodes : {512, 1024, 2048, 4096}) {
-    const std::string set = "of" + std::to_string(episodes);
-    ASSERT_EQ(run(folder_, {"generate", scene("rolling_ball_small.xml"), "--output", set,
-                            "--episodes", std::to_string(episodes), "--steps", "1", "--every", "1",
-                            "--record", "q", "--quiet"})
-                  .exit_code,
-              0);
-    robomimic.push_back(static_cast<double>(fs::file_size(folder_.path(set + "/robomimic.hdf5"))));
-    minari.push_back(static_cast<double>(fs::file_size(
-        folder_.path(set + "/minari/tangere/rolling_ball_small-v0/data/main_data.hdf5"))));
-    fs::remove_all(folder_.path(set));
-    if (memory == 0) memory = peak_memory();
-  }
-  for (const std::vector<double>* size : {&robomimic, &minari})
-    for (std::size_t k = 1; k + 1 < size->size(); ++k) {
-      const double first =
-          ((*size)[k] - (*size)[k - 1]) / 512.0 / static_cast<double>(1 << (k - 1));
-      const double then = ((*size)[k + 1] - (*size)[k]) / 512.0 / static_cast<double>(1 << k);
-      EXPECT_NEAR(then, first, 0.02 * first) << "bytes per episode";
-      EXPECT_LT(then, 2000);
-    }
-  if (kSanitized) return;  // a sanitizer keeps freed memory
-  // There are 3584 more episodes. If a command kept 5 kB of each, it would need 18 MB.
-  EXPECT_LT(peak_memory() - memory, 16 << 20) << "from " << memory;
 }
 
 TEST_F(DatasetCommand, MasksShareOutEveryDemoOnce) {

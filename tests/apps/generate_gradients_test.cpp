@@ -228,7 +228,7 @@ TEST(GenerateGradients, FailedEpisodesLeaveNone) {
 TEST(GenerateGradients, AreTheSameBesideAnyObservations) {
   const Folder folder;
   const Words task{"dummy", "--episodes", "20", "--gradients", "return"};
-  const Words scene{kSmall,    "--episodes", "20",          "--steps",  "50",
+  const Words scene{kSmall,    "--episodes", "20",          "--steps",  "25",
                     "--every", "5",          "--gradients", "jacobians"};
   const std::vector<std::pair<std::string, Words>> ways{{"deflate", {"--compress", "deflate"}},
                                                         {"lz4", {"--compress", "lz4"}},

@@ -100,7 +100,7 @@ TEST_F(GenerateStop, KilledAtAnyMomentItLeavesWholeShardsAndTheNextRunIsAsIfNoth
   std::mt19937 random(1);
   std::uniform_int_distribution<milliseconds::rep> moment(0, undisturbed.count());
   int killed = 0, with_part = 0, with_shard = 0;
-  for (int round = 0; round < 10; ++round) {
+  for (int round = 0; round < 6; ++round) {
     Program program(folder_, words(kTwoShards, {"--overwrite"}));
     if (round == 0) wait_for(kFirst + ".part");
     if (round == 1) {
@@ -162,7 +162,7 @@ TEST_F(GenerateStop, KilledAgainAndAgainItResumesToTheSameBytes) {
 /// TANGERE_KILLS=30 kills each kind of merge 30 times; without it, four times.
 TEST_F(GenerateStop, MergeKilledAtAnyMomentLeavesWholeFilesAndMergesToTheSameBytes) {
   const int kills = kills_or(4);
-  ASSERT_EQ(run(folder_, words("800", {"--shards", "2"})).exit_code, 0);
+  ASSERT_EQ(run(folder_, words("300", {"--shards", "2"})).exit_code, 0);
   const std::string merged = "set/robomimic.hdf5", view = "set/minari/tangere/free-v0/data/";
   const std::vector<std::string> outputs = {merged, view + "main_data.hdf5",
                                             view + "metadata.json"};

@@ -11,7 +11,6 @@
 #include "io/hdf5/h5.hpp"
 #include "io/scene/scene_reader.hpp"
 #include "tests/apps/program.hpp"
-#include "tests/sanitized.hpp"
 
 namespace tangere::apps {
 namespace {
@@ -242,31 +241,6 @@ INSTANTIATE_TEST_SUITE_P(
         Refusal{"disk", {"--episodes", "1000000000"}, 3, "needs at least"},
         Refusal{"no_controls", {"--controls", "nowhere.csv"}, 3, "nowhere.csv"}),
     [](const auto& test) { return test.param.name; });
-
-TEST(Generate, MemoryDoesNotGrowWithTheNumberOfEpisodes) {
-  if (kSanitized) GTEST_SKIP() << "sanitizers keep memory that was given back";
-  for (const Words& kind :
-       {Words{}, Words{"--tactile", "dense"}, Words{"--compress", "deflate", "--tactile", "dense"},
-        Words{"--compress", "lz4"}}) {
-    double before = 0;
-    for (const std::string episodes : {"64", "1024"}) {
-      const Folder folder;
-      Words words{"generate",   scene("rolling_ball_small.xml"),
-                  "--output",   "set",
-                  "--steps",    "50",
-                  "--every",    "5",
-                  "--threads",  "2",
-                  "--no-merge", "--episodes",
-                  episodes};
-      words.insert(words.end(), kind.begin(), kind.end());
-      ASSERT_EQ(run(folder, words).exit_code, 0);
-      if (episodes == "64") before = peak_memory();
-    }
-    // A thousand episodes are 135 MB.
-    EXPECT_LT(peak_memory() - before, 48 << 20) << "from " << before;
-    EXPECT_LT(peak_memory(), 232 << 20);
-  }
-}
 
 TEST(Generate, PlacesThatAreNoFoldersAreNamed) {
   const Folder folder;

@@ -62,7 +62,7 @@ TEST_P(EveryScene, ThreeRoutesAgreeOverAnyLength) {
   scene.integrator = GetParam().scheme;
   std::map<std::string, std::size_t> compared;
   for (const std::int64_t steps : lengths(GetParam())) {
-    const GradientCheck c = check(scene, GetParam().loss, steps, steps > 100 ? 1 : 3);
+    const GradientCheck c = check(scene, GetParam().loss, steps, steps > 100 ? 1 : 2);
     const double tolerance = steps > 100 ? 1e-5 : 1e-6;
     for (const CheckedInput& i : c.inputs) {
       EXPECT_LE(i.difference_error, tolerance)
@@ -159,7 +159,7 @@ TEST(Pictures, ThreeRoutesAgree) {
   picture.gel = std::make_shared<const Gel>(default_gel());
   scene.sensors[0].array.rows = 16, scene.sensors[0].array.cols = 20;
   scene.sensors[0].layer->cell = 0;
-  expect_right(check(scene, LossKind::pictures, 60, 15), 1e-5);
+  expect_right(check(scene, LossKind::pictures, 60, 6), 1e-5);
   scene.sensors[0].layer.reset();
   EXPECT_THROW(check(scene, LossKind::pictures, 60, 60), InputError);
 }
@@ -188,7 +188,7 @@ TEST(PublishedFaults, PositionControlGradientIsRight) {
           motor.P *= 0.1, motor.D *= 0.1;  // with explicit timing they are unstable at full gain
       }
       EXPECT_GT(motors, 0);
-      expect_right(check(scene, LossKind::final_state, 30, 6), 1e-6);
+      expect_right(check(scene, LossKind::final_state, 20, 4), 1e-6);
     }
 }
 

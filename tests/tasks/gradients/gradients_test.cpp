@@ -186,7 +186,7 @@ TEST_P(ShippedScene, GradientsAgreeByThreeRoutes) {
   const auto loss = make_loss(kind, model, 5);
   CheckOptions options;
   options.length = steps;
-  options.entries = 8;
+  options.entries = 4;
   options.stepper.tolerance = 1e-12;
   const GradientCheck check = check_gradient(start, controls_of(program), *loss, options);
   for (const CheckedInput& c : check.inputs) {
