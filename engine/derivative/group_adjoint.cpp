@@ -71,6 +71,7 @@ void GroupAdjoint::assemble(const StageContext<L>& s) const {
   kernel.kinematics(model_.view, w.stage);
   clear_candidates(model_, w);
   find_candidates(model_, s.table, w, s.lanes);
+  set_list_anchors(model_, s.table, w, s.lanes);
   if constexpr (L > 1)
     if (s.lone() < 0) lists_to_rows(model_, s.table, w, s.lanes);
   set_layer_sums(model_, s.table, w, s.lanes, true);

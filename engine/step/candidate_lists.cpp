@@ -63,6 +63,8 @@ CandidateLists<L>::CandidateLists(const CompiledModel& m)
       apart(m.link_pairs.size(), 1),
       apart_before(apart),
       in_rows(m.pairs.size(), 0),
+      anchored(in_rows),
+      anchors_in_rows(in_rows),
       storage_(m.pairs.size()) {
   if (m.view.faced) faces.resize(3 * m.pairs.size());
   if (std::ranges::any_of(m.pairs, [](const auto& pair) { return pair.size_row >= 0; }))
@@ -95,7 +97,7 @@ void CandidateLists<L>::reserve(const CompiledModel& m, std::size_t pair, int po
   copy_own<L>(old, list);
   std::swap(storage_[pair], storage);
   list.count = 0;
-  in_rows[pair] = all_in_rows = 0;
+  in_rows[pair] = anchors_in_rows[pair] = all_in_rows = 0;
 }
 
 template <int L>
@@ -108,6 +110,12 @@ void CandidateLists<L>::clear(LaneBits lanes) {
     for (int l = 0; l < L; ++l)
       if (has(lanes, l)) lists[k].own_count[l] = 0;
   }
+}
+
+template <int L>
+void CandidateLists<L>::drop_anchors() {
+  all_anchored = 0;
+  std::ranges::fill(anchored, kNoLane);
 }
 
 template <int L>

@@ -2,7 +2,7 @@
 // Lists of contact candidates of a group of eight lanes, or of a single lane, and the poses, sizes
 // and faces at which they were made. The lists of a lane are valid as long as it has not moved
 // farther than their margin from there, and its sizes and faces are the same. So they may be kept
-// from one step to the next.
+// from one step to the next. Anchors of shear springs are computed anew for every solve.
 #pragma once
 
 #include <climits>
@@ -36,6 +36,8 @@ class CandidateLists {
   void reserve(const CompiledModel& model, std::size_t pair, int points);
   /// Empties the lists of `lanes`, which have none then.
   void clear(LaneBits lanes);
+  /// Makes the anchors of all lists those of an earlier solve.
+  void drop_anchors();
   /// Returns the bytes of the lists of a scene if they hold all points of all pairs, but at most
   /// `most` of two links.
   static std::size_t bytes(const CompiledModel& model, int most = INT_MAX);
@@ -48,7 +50,11 @@ class CandidateLists {
   std::vector<unsigned char> apart;         ///< (n_link_pairs) as Stage::apart
   std::vector<unsigned char> apart_before;  ///< the same before the last search
   std::vector<LaneBits> in_rows;            ///< (n_pairs) lanes whose list is also in the rows
-  LaneBits all_in_rows = 0;                 ///< lanes of which all lists are
+  LaneBits all_in_rows = 0;                 ///< lanes of which all lists and anchors are
+  /// (n_pairs) lanes in which the points of a pair with shear springs have the anchors of the
+  /// present solve, and those of them whose anchors are also in the rows.
+  std::vector<LaneBits> anchored, anchors_in_rows;
+  LaneBits all_anchored = 0;                ///< lanes in which those of all pairs have them
   LaneBits searched = 0;                    ///< lanes that have lists, which may be empty
 
  private:

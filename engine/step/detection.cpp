@@ -8,7 +8,6 @@
 
 #include "engine/model/group_contacts.hpp"
 #include "engine/step/factors.hpp"
-#include "engine/step/shear_anchors.hpp"
 
 namespace tangere {
 
@@ -52,7 +51,7 @@ static void clear_lists(const CompiledModel& model, BasicWorkspace<L>& w, std::s
 }
 
 bool keeps_lists(const CompiledModel& model) {
-  return model.link_balls.empty() && !in_blocks(model) && model.shear_springs.empty();
+  return model.link_balls.empty() && !in_blocks(model);
 }
 
 template <int L>
@@ -169,7 +168,6 @@ static void search_lane(const CompiledModel& model, const kernels::KernelTable& 
     }
     w.candidates->reserve(model, k, count);
   }
-  if (list.own_anchors != nullptr) set_list_anchors(model, table, w, static_cast<int>(k), lane);
 }
 
 /// Searches the points of pair k in the lanes where they may be near.
@@ -178,6 +176,7 @@ static void search_pair(const CompiledModel& model, const kernels::KernelTable& 
                         BasicWorkspace<L>& w, std::size_t k, LaneBits lanes) {
   const kernels::Row<L>* row = w.near.shape_poses + 12 * k;
   auto& list = w.candidates->lists[k];
+  w.candidates->anchored[k] &= ~lanes;
   for (int l = 0; l < L; ++l) {
     if (!has(lanes, l)) continue;
     if (list.own_count[l] != 0 || has(w.near.lanes[k], l)) w.candidates->in_rows[k] &= ~(1U << l);
@@ -228,6 +227,7 @@ void find_candidates(const CompiledModel& model, const kernels::KernelTable& tab
         c.apart_before[g] != 0 ? c.searched : fresh | (lanes & w.near.outrun[g]);
     if (searched == 0) return;
     c.all_in_rows &= ~searched;
+    c.all_anchored &= ~searched;
     set_reference(w, g, searched);
     const kernels::LinkPair& links = model.link_pairs[g];
     for (int i = links.first; i < links.first + links.count; ++i)
@@ -248,6 +248,9 @@ void lists_to_rows(const CompiledModel& model, const kernels::KernelTable& table
       const auto k = std::size_t(model.pair_order[std::size_t(i)]);
       const LaneBits made = kAllLanes & ~std::exchange(c.in_rows[k], kAllLanes);
       if (made != 0) table.transpose_list(c.lists[k], made);
+      if (model.pairs[k].memory < 0 || c.lists[k].count == 0) continue;
+      if (std::exchange(c.anchors_in_rows[k], kAllLanes) != kAllLanes || made != 0)
+        table.transpose_anchors(c.lists[k]);
     }
   });
   c.all_in_rows = kAllLanes;

@@ -10,7 +10,7 @@ namespace tangere {
 /// Lists the candidates of `lanes` at the poses of kinematics(), where a lane has no lists or has
 /// moved farther than their margin. Other lists stay. Membership never changes a result: points
 /// that do not touch add exact zeros. In scenes that do not keep lists, all lists of `lanes` are
-/// made.
+/// made. New lists have no anchors (shear_anchors.hpp).
 template <int L>
 void find_candidates(const CompiledModel& model, const kernels::KernelTable& kernels,
                      BasicWorkspace<L>& w, LaneBits lanes);
@@ -33,13 +33,12 @@ void for_each_considered(const CompiledModel& model, const BasicWorkspace<L>& w,
   }
 }
 
-/// Copies the lists of `lanes` into rows, for evaluations of more than one lane.
+/// Copies the lists of `lanes`, and their anchors, into rows, for evaluations of more than one lane.
 void lists_to_rows(const CompiledModel& model, const kernels::KernelTable& kernels, Workspace& w,
                    LaneBits lanes);
 
-/// Whether lists are kept from one step to the next: not those of contacts with shear springs,
-/// which hold the springs' anchors, nor those of scenes of many pairs or trees, which take much
-/// memory.
+/// Whether lists are kept from one step to the next: not those of scenes of many pairs or trees,
+/// which take much memory.
 bool keeps_lists(const CompiledModel& model);
 
 /// Empties every list.

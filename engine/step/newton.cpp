@@ -48,6 +48,7 @@
 #include "engine/step/detection.hpp"
 #include "engine/step/factors.hpp"
 #include "engine/step/layer_sums.hpp"
+#include "engine/step/shear_anchors.hpp"
 
 namespace tangere {
 
@@ -108,6 +109,7 @@ struct Search {
     for (int l = 0; l < L; ++l)
       if (has(searching, l) && w.stage.excess[0][l] > 0) stale |= 1U << l;
     if (stale != 0) find_candidates(model, table, w, stale);
+    set_list_anchors(model, table, w, searching);
     if constexpr (L > 1)
       if (lone(searching) < 0) lists_to_rows(model, table, w, searching);
   }

@@ -8,14 +8,15 @@
 namespace tangere {
 
 /// Prepares a solve that begins at q0 with w.shear.now: poses there, and anchors on the ground and
-/// of joints.
+/// of joints. Those of lists are dropped.
 template <int L>
 void begin_shear(const CompiledModel& model, const kernels::KernelTable& table,
                  BasicWorkspace<L>& w);
 
-/// Computes the anchors of the points that lane `lane` has listed for pair k.
+/// Computes the anchors of the points that `lanes` have listed, where they are not those of the
+/// present solve.
 template <int L>
 void set_list_anchors(const CompiledModel& model, const kernels::KernelTable& table,
-                      BasicWorkspace<L>& w, int k, int lane);
+                      BasicWorkspace<L>& w, LaneBits lanes);
 
 }  // namespace tangere

@@ -6,6 +6,19 @@
 
 namespace tangere::kernels {
 
+#if defined(__AVX2__)
+/// Transposes four rows of four numbers. It is always inlined, because sources of several
+/// instruction sets contain it.
+[[gnu::always_inline]] inline void transpose_four(__m256d (&x)[4]) {
+  const __m256d low01 = _mm256_unpacklo_pd(x[0], x[1]), high01 = _mm256_unpackhi_pd(x[0], x[1]),
+                low23 = _mm256_unpacklo_pd(x[2], x[3]), high23 = _mm256_unpackhi_pd(x[2], x[3]);
+  x[0] = _mm256_permute2f128_pd(low01, low23, 0x20);
+  x[1] = _mm256_permute2f128_pd(high01, high23, 0x20);
+  x[2] = _mm256_permute2f128_pd(low01, low23, 0x31);
+  x[3] = _mm256_permute2f128_pd(high01, high23, 0x31);
+}
+#endif
+
 /// Number j of row i becomes number i of row j.
 template <class A>
 inline void transpose(Lanes<A> (&x)[kGroup]) {
@@ -27,6 +40,20 @@ inline void transpose(Lanes<A> (&x)[kGroup]) {
       x[odd + 2].r[0] = _mm512_shuffle_f64x2(low26, high26, 0x88);
       x[odd + 6].r[0] = _mm512_shuffle_f64x2(low26, high26, 0xdd);
     }
+    return;
+  }
+#endif
+#if defined(__AVX2__)
+  if constexpr (std::is_same_v<A, xsimd::avx2>) {
+    __m256d block[2][2][4];  // rows 4 i to 4 i + 3, register j
+    for (int i = 0; i < 2; ++i)
+      for (int j = 0; j < 2; ++j) {
+        for (int k = 0; k < 4; ++k) block[i][j][k] = x[4 * i + k].r[j];
+        transpose_four(block[i][j]);
+      }
+    for (int i = 0; i < 2; ++i)
+      for (int j = 0; j < 2; ++j)
+        for (int k = 0; k < 4; ++k) x[4 * j + k].r[i] = block[i][j][k];
     return;
   }
 #endif

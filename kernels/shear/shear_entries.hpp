@@ -5,6 +5,7 @@
 #include <cstddef>
 
 #include "kernels/numbers/linalg.hpp"
+#include "kernels/numbers/transpose.hpp"
 #include "kernels/shear/shear_types.hpp"
 
 namespace tangere::kernels {
@@ -27,9 +28,10 @@ struct PointNumbers {
   const int* index;
 };
 
-#if defined(__AVX512F__)
 // An entry is a vector (point, x, y, z) of 64-bit numbers. Only the lower half of the first counts.
 static_assert(sizeof(ShearEntry) == 32 && offsetof(ShearEntry, s) == 8);
+
+#if defined(__AVX512F__)
 
 /// Returns the numbers of eight points.
 inline __m256i point_numbers(const PointNumbers& at) {
@@ -82,6 +84,58 @@ inline void write_eight(const PointNumbers& points, const Vec3<Lanes<xsimd::avx5
 }
 #endif
 
+#if defined(__AVX2__)
+// Four entries at a time. Always inlined, because sources of several instruction sets contain it.
+
+/// Returns the numbers of points `first` to `first` + 3 of eight.
+[[gnu::always_inline]] inline __m128i four_numbers(const PointNumbers& at, int first) {
+  return _mm_add_epi32(_mm_loadu_si128(reinterpret_cast<const __m128i*>(at.index + first)),
+                       _mm_set1_epi32(at.first));
+}
+
+/// Reads the entries of the first `count` of eight points, which are adjacent, and zeros of the
+/// others. Eight entries are read. Returns false if those are of other points.
+[[gnu::always_inline]] inline bool read_adjacent(const PointNumbers& points, int count,
+                                                 const ShearEntry* at,
+                                                 Vec3<Lanes<xsimd::avx2>>& s) {
+  const auto* const from = reinterpret_cast<const double*>(at);
+  const __m256i low_halves = _mm256_setr_epi32(0, 2, 4, 6, 0, 2, 4, 6);
+  for (int i = 0; i < 2; ++i) {
+    __m256d x[4];
+    for (int k = 0; k < 4; ++k) x[k] = _mm256_loadu_pd(from + 4 * (4 * i + k));
+    transpose_four(x);
+    const __m128i counted =
+        _mm_cmpgt_epi32(_mm_set1_epi32(count - 4 * i), _mm_setr_epi32(0, 1, 2, 3));
+    const __m128i numbers = _mm256_castsi256_si128(
+        _mm256_permutevar8x32_epi32(_mm256_castpd_si256(x[0]), low_halves));
+    if (_mm_testz_si128(counted, _mm_xor_si128(numbers, four_numbers(points, 4 * i))) == 0)
+      return false;
+    const __m256d kept = _mm256_castsi256_pd(_mm256_cvtepi32_epi64(counted));
+    s.x.r[i] = _mm256_and_pd(kept, x[1]);
+    s.y.r[i] = _mm256_and_pd(kept, x[2]);
+    s.z.r[i] = _mm256_and_pd(kept, x[3]);
+  }
+  return true;
+}
+
+/// Writes the entries of the points in `which`, and up to eight entries in all. Returns the place
+/// behind those of the points.
+[[gnu::always_inline]] inline ShearEntry* write_eight(const PointNumbers& points,
+                                                      const Vec3<Lanes<xsimd::avx2>>& s,
+                                                      unsigned which, ShearEntry* to) {
+  for (int i = 0; i < 2; ++i) {
+    __m256d x[4] = {_mm256_castsi256_pd(_mm256_cvtepi32_epi64(four_numbers(points, 4 * i))),
+                    s.x.r[i], s.y.r[i], s.z.r[i]};
+    transpose_four(x);
+    for (int k = 0; k < 4; ++k) {
+      _mm256_storeu_pd(reinterpret_cast<double*>(to), x[k]);
+      to += which >> (4 * i + k) & 1U;
+    }
+  }
+  return to;
+}
+#endif
+
 /// Returns the elastic displacements of up to eight points, zeros where a point has no entry. Calls
 /// go through the points of a contact in order, and so through the entries.
 template <class A>
@@ -93,6 +147,15 @@ template <class A>
     Vec3<Lanes<A>> s;
     if (count >= kGroup && end - at >= kGroup && read_adjacent(points, at, s)) {
       entries.at = at + kGroup;
+      return s;
+    }
+  }
+#endif
+#if defined(__AVX2__)
+  if constexpr (std::is_same_v<A, xsimd::avx2>) {
+    Vec3<Lanes<A>> s;
+    if (end - at >= kGroup && read_adjacent(points, count, at, s)) {
+      entries.at = at + (count < kGroup ? count : kGroup);
       return s;
     }
   }
@@ -120,6 +183,9 @@ template <class A>
     write_eight(points, s, which, to);
     return to + __builtin_popcount(which);
   }
+#endif
+#if defined(__AVX2__)
+  if constexpr (std::is_same_v<A, xsimd::avx2>) return write_eight(points, s, which, to);
 #endif
   alignas(64) double x[3 * kGroup];
   store3(s, x, kGroup, 0);

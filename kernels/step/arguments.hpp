@@ -35,7 +35,7 @@ struct Stage {
     /// (L, stride) of each lane's points in PairContact::points; null in pairs without shear
     /// springs and layers.
     int* own_index;
-    // Anchors of the points; null in pairs without shear springs.
+    // Anchors of the points, those of the present solve; null in pairs without shear springs.
     double* own_anchors;  ///< (L, kAnchorNumbers, stride)
     Row<L>* anchors;      ///< (stride, kAnchorNumbers)
     // Areas of the points; null in pairs whose coefficients count per point.

@@ -63,12 +63,44 @@ void near_pairs(const ModelView& model, const StageArgs<N>& a, NearPairs<L>& out
   });
 }
 
+#if defined(__AVX2__)
+/// Numbers of the bits that are set in four, as pairs of 32-bit halves of 64-bit numbers.
+struct FourBits {
+  alignas(32) int halves[16][8] = {};
+  alignas(16) int numbers[16][4] = {};
+  constexpr FourBits() {
+    for (int bits = 0; bits < 16; ++bits)
+      for (int k = 0, at = 0; k < 4; ++k)
+        if ((bits >> k & 1) != 0) {
+          numbers[bits][at] = k;
+          halves[bits][2 * at] = 2 * k, halves[bits][2 * at + 1] = 2 * k + 1;
+          ++at;
+        }
+  }
+};
+inline constexpr FourBits kFourBits;
+#endif
+
 /// Appends the lanes in `which`. It may write up to eight numbers, however many are appended.
 template <class A>
 void append(const Lanes<A>& a, unsigned which, double* out) {
 #if defined(__AVX512F__)
   if constexpr (std::is_same_v<A, xsimd::avx512bw>) {
     _mm512_storeu_pd(out, _mm512_maskz_compress_pd(static_cast<__mmask8>(which), a.r[0]));
+    return;
+  }
+#endif
+#if defined(__AVX2__)
+  if constexpr (std::is_same_v<A, xsimd::avx2>) {
+    for (int i = 0; i < 2; ++i) {
+      const unsigned bits = which >> (4 * i) & 0xfU;
+      const __m256i from =
+          _mm256_load_si256(reinterpret_cast<const __m256i*>(kFourBits.halves[bits]));
+      const __m256d of = a.r[i];
+      _mm256_storeu_pd(out, _mm256_castsi256_pd(_mm256_permutevar8x32_epi32(
+                                _mm256_castpd_si256(of), from)));
+      out += __builtin_popcount(bits);
+    }
     return;
   }
 #endif
@@ -87,6 +119,19 @@ void append_numbers(int first, unsigned which, int* out) {
                          _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 0, 0, 0, 0, 0, 0, 0, 0));
     const __m512i kept = _mm512_maskz_compress_epi32(static_cast<__mmask16>(which), all);
     _mm256_storeu_si256(reinterpret_cast<__m256i*>(out), _mm512_castsi512_si256(kept));
+    return;
+  }
+#endif
+#if defined(__AVX2__)
+  if constexpr (std::is_same_v<A, xsimd::avx2>) {
+    for (int i = 0; i < 2; ++i) {
+      const unsigned bits = which >> (4 * i) & 0xfU;
+      const __m128i numbers =
+          _mm_load_si128(reinterpret_cast<const __m128i*>(kFourBits.numbers[bits]));
+      _mm_storeu_si128(reinterpret_cast<__m128i*>(out),
+                       _mm_add_epi32(numbers, _mm_set1_epi32(first + 4 * i)));
+      out += __builtin_popcount(bits);
+    }
     return;
   }
 #endif
@@ -148,32 +193,42 @@ int search_candidates(const CandidateSearch& s) {
       [&]<class Shape>(const Shape& shape) { return search_shape<A, Shape>(s, shape); });
 }
 
-/// Makes rows of the own numbers of `lanes`, of which each point has `Numbers`. The rows of other
-/// lanes stay. They are filled up to `list.count` from `before` on, where they ended.
+/// Makes rows of the own numbers of all lanes, of which each point has `Numbers`, eight points at a
+/// time. Rows after those of the points are filled, up to a multiple of eight.
+template <class A, int Numbers>
+void transpose_all(const GroupStage::List& list, const double* own, double filler,
+                   Row<kGroup>* rows) {
+  for (int k = 0; k < list.count; k += kGroup)
+    for (int c = 0; c < Numbers; ++c) {
+      Lanes<A> x[kGroup];
+      for (int l = 0; l < kGroup; ++l)
+        x[l] = k < list.own_count[l] ? load_lanes<A>(own + (l * Numbers + c) * list.stride + k)
+                                     : Lanes<A>(filler);
+      transpose(x);
+      for (int i = 0; i < kGroup; ++i) store_lanes(x[i], rows[Numbers * (k + i) + c].lane);
+    }
+}
+
+/// The same of `lanes`; the rows of other lanes stay. They are filled up to `list.count` from
+/// `before` on, where they ended.
 template <class A, int Numbers>
 void transpose_numbers(const GroupStage::List& list, unsigned lanes, int before, const double* own,
                        double filler, Row<kGroup>* rows) {
   if (rows == nullptr) return;
-  const auto column = [&](int l, int c) { return own + (l * Numbers + c) * list.stride; };
-  int whole = 0;  // points that all lanes have, row by row
-  if (lanes == (1U << kGroup) - 1) {
-    whole = list.count;
-    for (const int own_count : list.own_count) whole = own_count < whole ? own_count : whole;
-    for (int k = 0; k < whole; ++k)
-      for (int c = 0; c < Numbers; ++c)
-        for (int l = 0; l < kGroup; ++l) rows[Numbers * k + c][l] = column(l, c)[k];
-  }
+  if (lanes == (1U << kGroup) - 1) return transpose_all<A, Numbers>(list, own, filler, rows);
   for (int l = 0; l < kGroup; ++l) {
     const bool made = (lanes >> l & 1U) != 0;
     const int end = list.own_count[l], rest = made || end > before ? end : before;
     for (int c = 0; c < Numbers; ++c) {
-      for (int k = whole; k < end && made; ++k) rows[Numbers * k + c][l] = column(l, c)[k];
+      const double* const column = own + (l * Numbers + c) * list.stride;
+      for (int k = 0; k < end && made; ++k) rows[Numbers * k + c][l] = column[k];
       for (int k = rest; k < list.count; ++k) rows[Numbers * k + c][l] = filler;
     }
   }
 }
 
-/// Makes rows of eight lanes from the own lists of `lanes`. Shorter lists end in far points.
+/// Makes rows of eight lanes from the own lists of `lanes`, all but their anchors. Shorter lists
+/// end in far points.
 template <class A>
 void transpose_rows(GroupStage::List& list, unsigned lanes) {
   const int before = list.count;
@@ -181,7 +236,12 @@ void transpose_rows(GroupStage::List& list, unsigned lanes) {
   for (const int count : list.own_count) list.count = count > list.count ? count : list.count;
   transpose_numbers<A, 3>(list, lanes, before, list.own, kFarAway, list.points);
   transpose_numbers<A, 1>(list, lanes, before, list.own_weights, 0, list.weights);
-  transpose_numbers<A, kAnchorNumbers>(list, lanes, before, list.own_anchors, 0, list.anchors);
+}
+
+/// Makes rows of eight lanes from the own anchors of all lanes.
+template <class A>
+void transpose_anchors(const GroupStage::List& list) {
+  transpose_all<A, kAnchorNumbers>(list, list.own_anchors, 0, list.anchors);
 }
 
 }  // namespace tangere::kernels

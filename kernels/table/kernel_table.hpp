@@ -105,8 +105,10 @@ struct KernelTable {
   StageKernels<1> single;  ///< one environment on its own: the same bits as in a group
   /// Fills `points`, padded to a multiple of eight. Returns their number without padding.
   int (*find_candidates)(const CandidateSearch&);
-  /// Makes the rows of a list from its lanes' points.
+  /// Makes the rows of a list from its lanes' points, all but the anchors.
   void (*transpose_list)(GroupStage::List&, unsigned lanes);
+  /// Makes the rows of the anchors of all lanes.
+  void (*transpose_anchors)(const GroupStage::List&);
   /// Computes poses and twists of all links, (n_links).
   void (*link_poses)(const ModelView&, const GroupState&, LinkPose<LaneRow>* out);
   /// Computes pose and twist of a shape against a pad, both given in their links (nullptr: the

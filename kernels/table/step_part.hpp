@@ -108,6 +108,7 @@ void add_group_kernels(KernelTable& k) {
   k.transpose_list = [](GroupStage::List& list, unsigned lanes) {
     transpose_rows<Arch>(list, lanes);
   };
+  k.transpose_anchors = [](const GroupStage::List& list) { transpose_anchors<Arch>(list); };
   k.link_poses = [](const ModelView& m, const GroupState& s, LinkPose<LaneRow>* out) {
     using N = Lanes<Arch>;
     kernels::link_poses(m, at_state<N>(s), reinterpret_cast<LinkPose<N>*>(out));

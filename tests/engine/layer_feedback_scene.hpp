@@ -105,6 +105,7 @@ class LayerProbe {
     table_.stage<1>().kinematics(m_.view, w_.stage);
     clear_candidates(m_, w_);
     find_candidates(m_, table_, w_, 1U);
+    set_list_anchors(m_, table_, w_, 1U);
   }
 
   Model model_;

@@ -88,6 +88,7 @@ inline std::array<double, 3> loads_by_kernels(const Batch& batch, int environmen
   kernel.kinematics(m.view, w.stage);
   clear_candidates(m, w);
   find_candidates(m, table, w, 1U);
+  set_list_anchors(m, table, w, 1U);
   kernel.residual(m.view, w.stage, 0);
   AlignedVector<kernels::Row<1>> rows(6 * (m.link_pairs.size() + m.grounded.size()));
   kernel.contact_wrenches(m.view, w.stage, rows.data());

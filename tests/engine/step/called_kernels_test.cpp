@@ -60,7 +60,7 @@ using OfMemory =
             &LoneTable::recall_ground, &GroupTable::advance_ground, &LoneTable::advance_ground,
             &GroupTable::clear_far_contacts, &LoneTable::clear_far_contacts, &KernelTable::recall,
             &KernelTable::recall_entries, &KernelTable::advance, &KernelTable::advance_entries,
-            &KernelTable::advance_list>;
+            &KernelTable::advance_list, &KernelTable::transpose_anchors>;
 using OfFields =
     Kernels<&KernelTable::pad_touch, &KernelTable::tactile, &KernelTable::tactile_mixed,
             &KernelTable::tactile_block, &KernelTable::tactile_block_mixed>;

@@ -4,8 +4,10 @@
 // copy.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <utility>
 
+#include "engine/derivative/adjoint.hpp"
 #include "engine/model/compile.hpp"
 #include "engine/step/candidate_lists.hpp"
 #include "engine/step/candidate_store.hpp"
@@ -51,6 +53,24 @@ Scene boxes() {
   return s;
 }
 
+/// The same with springs in every contact, and a skin with springs under the base's points.
+Scene boxes_with_springs() {
+  Scene s = boxes();
+  s.name = "boxes_with_springs";
+  for (PairContactDescription& c : s.pair_contacts) c.coefficients.ks = 4e3;
+  s.ground = GroundDescription{{0, 0, -0.02}, {0, 0, 1}};
+  s.links.push_back(testing::link("brick", JointType::free, {0.2, 0, -0.0101},
+                                  CuboidShape{{0.05, 0.05, 0.02}, {3, 3, 2}}, 1000));
+  s.ground_contacts.push_back({"brick", {800, 1, 0.4, 2, 300}, ContactLaw::linear, 1e-5, {}});
+  TactileDescription t;
+  t.name = "skin";
+  t.body = "base";
+  t.coefficients = {50, 0.05, 0.4, 50, 20};
+  t.array = {{-0.035, -0.035, 0}, {0.035, 0.035, 0}, {1, 0, 0}, {0, 1, 0}, 9, 9};
+  s.sensors.push_back(t);
+  return s;
+}
+
 std::vector<double> numbers_of(const Batch& batch) {
   std::vector<double> all;
   for (int e = 0; e < batch.environments(); ++e) {
@@ -59,6 +79,10 @@ std::vector<double> numbers_of(const Batch& batch) {
     all.push_back(double(batch.status(e)));
     all.push_back(batch.iterations(e));
     all.push_back(batch.residual(e));
+    for (const ShearEntry& entry : batch.shear_state(e)) {
+      all.push_back(entry.point);
+      all.insert(all.end(), entry.s, entry.s + 3);
+    }
   }
   return all;
 }
@@ -118,6 +142,76 @@ TEST(KeptCandidates, ChangeNoBitsWhereSizesVary) {
 }
 TEST(KeptCandidates, ChangeNoBitsWhereFacesAreChosen) {
   expect_same_bits_on_every_instruction_set(boxes(), {});
+}
+
+TEST(KeptCandidates, ChangeNoBitsOfShearSprings) {
+  expect_same_bits_on_every_instruction_set(boxes_with_springs(), {});
+}
+
+/// The gradient of a sum of coordinates and velocities after twelve steps, by the states at the
+/// start. `kept`: whether lists are kept from step to step.
+std::vector<double> gradient(const Model& model, bool kept) {
+  constexpr int kSteps = 12;
+  Stepper stepper(model);
+  Batch batch(model, 3, 5);
+  for (int e = 0; e < batch.environments(); ++e) {
+    std::vector<double> q = testing::q_of(batch, e), v = testing::v_of(batch, e);
+    v[0] = 0.05 * e, v[7] = 0.1;
+    batch.set_state(e, q, v);
+  }
+  BlockTape tape(model, stepper.integrator(), kSteps);
+  tape.start(batch, 0);
+  for (int t = 0; t < kSteps; ++t) {
+    if (!kept) batch = Batch(batch);
+    stepper.step_block(batch, 0, {}, &tape);
+  }
+  Adjoint adjoint(model);
+  adjoint.clear();
+  BlockCotangent& loss = adjoint.loss(0);
+  for (double& q : loss.q) q = 1;
+  for (double& v : loss.v) v = 0.1;
+  for (int t = kSteps; t > 0; --t) adjoint.reverse_step(batch, 0, tape, t - 1, {});
+  std::vector<double> all(loss.q.begin(), loss.q.end());
+  all.insert(all.end(), loss.v.begin(), loss.v.end());
+  return all;
+}
+
+TEST(KeptCandidates, ChangeNoBitsOfGradients) {
+  const Model model(boxes_with_springs());
+  const std::vector<double> kept = gradient(model, true);
+  EXPECT_GT(*std::ranges::max_element(kept), 0.5);
+  EXPECT_EQ(kept, gradient(model, false));
+}
+
+/// In a second step the lists of a box at rest are those of the first; the anchors are not.
+TEST(KeptCandidates, HaveTheAnchorsOfTheirStep) {
+  const auto m = compile(boxes_with_springs());
+  ASSERT_TRUE(keeps_lists(*m));
+  Workspace w(*m);
+  SingleWorkspace alone(*m);
+  for (int i = 0; i < m->nq; ++i)
+    for (double& q : w.q0[i].lane) q = m->initial_q[std::size_t(i)];
+  for (double& v : w.v0[0].lane) v = 2e-3;  // of the low box, along x
+  const kernels::KernelTable& table = kernels::active_kernels();
+  NewtonReport report;
+  const GroupStep step(*m, {Integrator::bdf1, 1e-4, 1e-9, 20});
+  const auto take = [&] {
+    step.advance(table, w, alone, kAllLanes, kNoLane, report);
+    std::vector<double> anchors;
+    const auto& list = w.own_candidates.lists[0];
+    for (int k = 0; k < list.own_count[3]; ++k)
+      anchors.push_back(list.own_anchors[(3 * kernels::kAnchorNumbers + 2) * list.stride + k]);
+    return anchors;
+  };
+  const std::vector<double> first = take();
+  ASSERT_FALSE(first.empty());
+  const AlignedVector<kernels::LaneRow> references = w.own_candidates.references;
+  const std::vector<double> second = take();
+  for (std::size_t i = 0; i < references.size(); ++i)
+    for (int l = 0; l < kernels::kGroup; ++l)
+      ASSERT_EQ(w.own_candidates.references[i][l], references[i][l]) << "the lists were made anew";
+  ASSERT_EQ(first.size(), second.size());
+  for (std::size_t k = 0; k < first.size(); ++k) EXPECT_NE(first[k], second[k]) << "point " << k;
 }
 
 TEST(KeptCandidates, AreDroppedWhereFacesChange) {
