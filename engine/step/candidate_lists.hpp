@@ -54,8 +54,8 @@ class CandidateLists {
   /// (n_pairs) lanes in which the points of a pair with shear springs have the anchors of the
   /// present solve, and those of them whose anchors are also in the rows.
   std::vector<LaneBits> anchored, anchors_in_rows;
-  LaneBits all_anchored = 0;                ///< lanes in which those of all pairs have them
-  LaneBits searched = 0;                    ///< lanes that have lists, which may be empty
+  LaneBits all_anchored = 0;  ///< lanes in which those of all pairs have them
+  LaneBits searched = 0;      ///< lanes that have lists, which may be empty
 
  private:
   struct Storage {

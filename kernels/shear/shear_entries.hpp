@@ -106,8 +106,8 @@ inline void write_eight(const PointNumbers& points, const Vec3<Lanes<xsimd::avx5
     transpose_four(x);
     const __m128i counted =
         _mm_cmpgt_epi32(_mm_set1_epi32(count - 4 * i), _mm_setr_epi32(0, 1, 2, 3));
-    const __m128i numbers = _mm256_castsi256_si128(
-        _mm256_permutevar8x32_epi32(_mm256_castpd_si256(x[0]), low_halves));
+    const __m128i numbers =
+        _mm256_castsi256_si128(_mm256_permutevar8x32_epi32(_mm256_castpd_si256(x[0]), low_halves));
     if (_mm_testz_si128(counted, _mm_xor_si128(numbers, four_numbers(points, 4 * i))) == 0)
       return false;
     const __m256d kept = _mm256_castsi256_pd(_mm256_cvtepi32_epi64(counted));

@@ -97,8 +97,8 @@ void append(const Lanes<A>& a, unsigned which, double* out) {
       const __m256i from =
           _mm256_load_si256(reinterpret_cast<const __m256i*>(kFourBits.halves[bits]));
       const __m256d of = a.r[i];
-      _mm256_storeu_pd(out, _mm256_castsi256_pd(_mm256_permutevar8x32_epi32(
-                                _mm256_castpd_si256(of), from)));
+      _mm256_storeu_pd(
+          out, _mm256_castsi256_pd(_mm256_permutevar8x32_epi32(_mm256_castpd_si256(of), from)));
       out += __builtin_popcount(bits);
     }
     return;
