@@ -33,7 +33,7 @@ void for_each_considered(const CompiledModel& model, const BasicWorkspace<L>& w,
   }
 }
 
-/// Copies the lists of `lanes`, and their anchors, into rows, for evaluations of more than one lane.
+/// Copies the lists of `lanes` and their anchors into rows, for evaluations of more than one lane.
 void lists_to_rows(const CompiledModel& model, const kernels::KernelTable& kernels, Workspace& w,
                    LaneBits lanes);
 
