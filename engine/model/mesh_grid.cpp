@@ -17,7 +17,7 @@
 #include <mutex>
 
 #include "engine/base/error.hpp"
-#include "engine/model/triangle_tree.hpp"
+#include "engine/model/node_distances.hpp"
 #include "kernels/contact/shapes/spline.hpp"
 
 namespace tangere {
@@ -29,21 +29,6 @@ namespace {
 constexpr int kBeyond = 2;                         // cells: of the box of what touches
 constexpr int kPadding = kBeyond + kernels::kRim;  // of the grid
 
-/// The nodes of a grid, z fastest.
-struct Nodes {
-  int count[3];
-  double origin[3], cell;
-
-  [[nodiscard]] std::size_t all() const {
-    return std::size_t(count[0]) * std::size_t(count[1]) * std::size_t(count[2]);
-  }
-  [[nodiscard]] std::size_t at(int i, int j, int k) const {
-    return (std::size_t(i) * std::size_t(count[1]) + std::size_t(j)) * std::size_t(count[2]) +
-           std::size_t(k);
-  }
-  [[nodiscard]] double place(int axis, int i) const { return origin[axis] + i * cell; }
-};
-
 struct Crossing {
   double z;
   int turn;  ///< +1: the triangle faces upwards
@@ -54,7 +39,7 @@ struct Crossing {
 /// draw.
 class Crossings {
  public:
-  Crossings(const MeshShape& mesh, const Nodes& nodes)
+  Crossings(const MeshShape& mesh, const GridNodes& nodes)
       : mesh_(mesh),
         nodes_(nodes),
         crossings_(std::size_t(nodes.count[0]) * std::size_t(nodes.count[1])) {
@@ -115,31 +100,33 @@ class Crossings {
   }
 
   const MeshShape& mesh_;
-  const Nodes& nodes_;
+  const GridNodes& nodes_;
   std::vector<std::vector<Crossing>> crossings_;
 };
 
-/// Returns the signed distance at every node.
-std::vector<double> distances(const MeshShape& mesh, const Nodes& nodes) {
-  const TriangleTree tree(mesh.vertices, mesh.triangles);
+/// Throws unless every node is outside or inside, and returns which ones are inside.
+std::vector<bool> inside(const MeshShape& mesh, const GridNodes& nodes) {
   Crossings crossings(mesh, nodes);
-  std::vector<double> d(nodes.all());
-  int nearest_at_start = 0;  // the triangle nearest to the first node of the line before
+  std::vector<bool> out(nodes.all());
   for (int i = 0; i < nodes.count[0]; ++i)
-    for (int j = 0; j < nodes.count[1]; ++j) {
-      int nearest = nearest_at_start;
+    for (int j = 0; j < nodes.count[1]; ++j)
       crossings.for_each(i, j, [&](int k, int winding) {
-        const Vec3<double> at = {nodes.place(0, i), nodes.place(1, j), nodes.place(2, k)};
         if (winding != 0 && winding != 1)
           throw InputError(fmt::format(
               "the surface encloses the place ({:g} {:g} {:g}) m {} times; expected a surface that "
               "does not overlap itself, or resolution=\"0\" for a mesh that nothing touches",
-              at.x, at.y, at.z, winding));
-        const double far = std::sqrt(tree.squared_distance(at, nearest));
-        if (k + 1 == nodes.count[2]) nearest_at_start = nearest;
-        d[nodes.at(i, j, k)] = winding == 1 ? -far : far;
+              nodes.place(0, i), nodes.place(1, j), nodes.place(2, k), winding));
+        out[nodes.at(i, j, k)] = winding == 1;
       });
-    }
+  return out;
+}
+
+/// Returns the signed distance at every node.
+std::vector<double> distances(const MeshShape& mesh, const GridNodes& nodes) {
+  const std::vector<bool> negative = inside(mesh, nodes);
+  std::vector<double> d = node_distances(mesh.vertices, mesh.triangles, nodes);
+  for (std::size_t n = 0; n < d.size(); ++n)
+    if (negative[n]) d[n] = -d[n];
   return d;
 }
 
@@ -383,7 +370,7 @@ std::shared_ptr<const MeshGrid> make_mesh_grid(const MeshShape& mesh) {
   const double longest = std::max({high[0] - low[0], high[1] - low[1], high[2] - low[2]});
   auto out = std::make_shared<MeshGrid>();
   kernels::DistanceGrid& g = out->view;
-  Nodes nodes{};
+  GridNodes nodes{};
   nodes.cell = g.cell = longest / mesh.resolution;
   for (int c = 0; c < 3; ++c) {
     g.cells[c] = static_cast<int>(std::ceil((high[c] - low[c]) / g.cell - 1e-9)) + 2 * kPadding;
