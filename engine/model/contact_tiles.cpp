@@ -35,6 +35,41 @@ void split(const std::vector<double>& points, std::vector<int>& order, std::size
   split(points, order, middle, end, tile);
 }
 
+/// Appends centre and radius of a ball around points begin … end - 1.
+void append_ball(const double* points, std::size_t begin, std::size_t end,
+                 std::vector<double>& out) {
+  double low[3], high[3], centre[3];
+  for (int a = 0; a < 3; ++a) low[a] = HUGE_VAL, high[a] = -HUGE_VAL;
+  for (std::size_t k = begin; k < end; ++k)
+    for (int a = 0; a < 3; ++a)
+      low[a] = std::min(low[a], points[3 * k + a]), high[a] = std::max(high[a], points[3 * k + a]);
+  for (int a = 0; a < 3; ++a) centre[a] = 0.5 * (low[a] + high[a]);
+  double square = 0;
+  for (std::size_t k = begin; k < end; ++k) {
+    double r = 0;
+    for (int a = 0; a < 3; ++a)
+      r += (points[3 * k + a] - centre[a]) * (points[3 * k + a] - centre[a]);
+    square = std::max(square, r);
+  }
+  // Rounded up: a bound that is too small by one bit would be no bound.
+  out.insert(out.end(),
+             {centre[0], centre[1], centre[2], std::sqrt(square) * (1 + 1e-12) + 1e-300});
+}
+
+/// Lays out balls, (n, 4), in the order in which vectors read them: (ceil(n/8), 4, 8), padded with
+/// far balls to `count`.
+AlignedVector<double> in_vectors(const std::vector<double>& balls, int count) {
+  constexpr int kLanes = kernels::kGroup;
+  AlignedVector<double> out(std::size_t((count + kLanes - 1) / kLanes * 4 * kLanes));
+  for (int t = 0; t < int(out.size()) / 4; ++t)
+    for (int c = 0; c < 4; ++c)
+      out[std::size_t((t / kLanes * 4 + c) * kLanes + t % kLanes)] =
+          std::size_t(4 * t) < balls.size() ? balls[std::size_t(4 * t + c)]
+          : c < 3                           ? kernels::kFarAway
+                                            : 0;
+  return out;
+}
+
 }  // namespace
 
 std::vector<double> sort_into_tiles(std::vector<double>& points, int tile,
@@ -49,43 +84,17 @@ std::vector<double> sort_into_tiles(std::vector<double>& points, int tile,
   points = std::move(sorted);
   if (before != nullptr) *before = order;
   std::vector<double> bounds;
-  for (std::size_t begin = 0; begin < n; begin += std::size_t(tile)) {
-    const std::size_t end = std::min(n, begin + std::size_t(tile));
-    double low[3], high[3], centre[3];
-    for (int a = 0; a < 3; ++a) low[a] = HUGE_VAL, high[a] = -HUGE_VAL;
-    for (std::size_t k = begin; k < end; ++k)
-      for (int a = 0; a < 3; ++a)
-        low[a] = std::min(low[a], points[3 * k + a]),
-        high[a] = std::max(high[a], points[3 * k + a]);
-    for (int a = 0; a < 3; ++a) centre[a] = 0.5 * (low[a] + high[a]);
-    double square = 0;
-    for (std::size_t k = begin; k < end; ++k) {
-      double r = 0;
-      for (int a = 0; a < 3; ++a)
-        r += (points[3 * k + a] - centre[a]) * (points[3 * k + a] - centre[a]);
-      square = std::max(square, r);
-    }
-    // Rounded up: a bound that is too small by one bit would be no bound.
-    bounds.insert(bounds.end(),
-                  {centre[0], centre[1], centre[2], std::sqrt(square) * (1 + 1e-12) + 1e-300});
-  }
+  for (std::size_t begin = 0; begin < n; begin += std::size_t(tile))
+    append_ball(points.data(), begin, std::min(n, begin + std::size_t(tile)), bounds);
   return bounds;
 }
 
 void lay_out_tiles(CompiledModel& m, kernels::PairContact& pair, const std::vector<double>& tiles) {
-  constexpr int kTile = kernels::kContactTile, kLanes = kernels::kGroup;
+  constexpr int kTile = kernels::kContactTile;
   AlignedVector<double> points(std::size_t(pair.n_tiles) * 3 * kTile, kernels::kFarAway);
   for (int k = 0; k < pair.n_points; ++k)
     for (int c = 0; c < 3; ++c)
       points[std::size_t((k / kTile * 3 + c) * kTile + k % kTile)] = pair.points[3 * k + c];
-  const int groups = (pair.n_tiles + kLanes - 1) / kLanes;
-  AlignedVector<double> bounds(std::size_t(groups) * 4 * kLanes, kernels::kFarAway);
-  for (int t = 0; t < groups * kLanes; ++t)
-    for (int c = 0; c < 4; ++c)
-      bounds[std::size_t((t / kLanes * 4 + c) * kLanes + t % kLanes)] =
-          t < pair.n_tiles ? tiles[std::size_t(4 * t + c)]
-          : c < 3          ? kernels::kFarAway
-                           : 0;
   m.tile_storage.push_back(std::move(points));
   pair.tile_points = m.tile_storage.back().data();
   if (pair.weights != nullptr) {
@@ -94,8 +103,16 @@ void lay_out_tiles(CompiledModel& m, kernels::PairContact& pair, const std::vect
     m.tile_storage.push_back(std::move(weights));
     pair.tile_weights = m.tile_storage.back().data();
   }
-  m.tile_storage.push_back(std::move(bounds));
+  m.tile_storage.push_back(in_vectors(tiles, pair.n_tiles));
   pair.tile_bounds = m.tile_storage.back().data();
+  if (pair.grid == nullptr) return;
+  constexpr int kEight = kernels::kGroup;
+  std::vector<double> eights;
+  for (int k = 0; k < pair.n_points; k += kEight)
+    append_ball(pair.points, std::size_t(k), std::size_t(std::min(pair.n_points, k + kEight)),
+                eights);
+  m.tile_storage.push_back(in_vectors(eights, pair.n_tiles * (kTile / kEight)));
+  pair.eight_bounds = m.tile_storage.back().data();
 }
 
 void lay_out_tiles(CompiledModel& m, kernels::GroundContact& ground) {

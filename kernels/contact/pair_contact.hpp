@@ -207,20 +207,22 @@ void add_derivative(PairSums<N>& sums, const PointContact<N>& p, PointDerivative
   sums.d[0][1] = sums.d[0][1] - cross_columns(p.x2, r.f_u);
 }
 
-/// Adds one point. Points that do not touch (d ≥ 0) add exact zeros.
+/// Adds one point, and returns the lanes in which it touches. Points that do not touch (d ≥ 0) add
+/// exact zeros.
 template <bool Derivatives, class Shape, class N>
-void accumulate(PairSums<N>& sums, const Shape& shape, const LawParameters<N>& law,
-                const Mat3<N>& Q, const Vec3<N>& c, const Vec3<N>& omega, const Vec3<N>& v,
-                const Vec3<N>& xi) {
+unsigned accumulate(PairSums<N>& sums, const Shape& shape, const LawParameters<N>& law,
+                    const Mat3<N>& Q, const Vec3<N>& c, const Vec3<N>& omega, const Vec3<N>& v,
+                    const Vec3<N>& xi) {
   const PointContact<N> p = point_contact(shape, law, Q, c, omega, v, xi);
   const auto touching = p.d < N(0.0);
-  if (!any(touching)) return;
+  if (!any(touching)) return 0;
   sums.wrench.a += cross(p.x2, p.force);
   sums.wrench.l += p.force;
   if constexpr (Derivatives) {
     PointDerivative<N> r = differentiate<Shape>(law, p, omega);
     add_derivative(sums, p, r);
   }
+  return lane_bits(touching);
 }
 
 /// Computes everything but friction and force of a point or a sphere on the ground, with velocity

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Finds which points of a body may touch a shape. First one bounding sphere of all points is tested
-// across environments, then those of tiles, then points, eight at a time.
+// across environments, then those of tiles, then points, eight at a time. For shapes whose distance
+// costs much, spheres of eight points are tested before their points.
 #pragma once
 
 #include "kernels/contact/distance.hpp"
@@ -22,6 +23,24 @@ unsigned near_shape(const Shape& shape, const Frame<N>& pose, const Vec3<N>& pla
   } else {
     return lane_bits(nearer_than(shape, transposed_times(pose.R, arm), m));
   }
+}
+
+/// Returns which eights of two neighbouring tiles may be nearer than m to a shape posed there, of
+/// tiles 0 and 1 in `tiles`: bits 0 … 3 are those of the first. All, where no bounds are known.
+template <class Shape, class A>
+unsigned near_eights(const Shape& shape, const Frame<Lanes<A>>& pose, const double* bounds,
+                     unsigned tiles, const Lanes<A>& m) {
+  const unsigned wanted = (tiles & 1U) * 0x0fU + (tiles >> 1U) * 0xf0U;
+  if constexpr (Shape::kBending == Bending::general &&
+                requires { roughly_nearer_than(shape, pose.p, m); }) {
+    if (bounds == nullptr) return wanted;
+    const Vec3<Lanes<A>> centre = {load_lanes<A>(bounds), load_lanes<A>(bounds + kGroup),
+                                   load_lanes<A>(bounds + 2 * kGroup)};
+    const Vec3<Lanes<A>> y = transposed_times(pose.R, centre - pose.p);
+    const Lanes<A> reach = load_lanes<A>(bounds + 3 * kGroup) + m;
+    return wanted & lane_bits(roughly_nearer_than(shape, y, reach));
+  }
+  return wanted;
 }
 
 template <class N>
@@ -149,17 +168,26 @@ int search_shape(const CandidateSearch& s, Shape shape) {
   const PairContact& pair = *s.pair;
   const N margin(s.margin);
   double *x = s.points, *y = x + s.stride, *z = y + s.stride;
+  constexpr int kEights = kContactTile / kGroup;  // of a tile
   int count = 0;
   for (int group = 0; group * kGroup < pair.n_tiles; ++group) {
     const double* b = pair.tile_bounds + 4 * kGroup * group;
     const Vec3<N> centre = {load_lanes<A>(b), load_lanes<A>(b + kGroup),
                             load_lanes<A>(b + 2 * kGroup)};
     const N reach = load_lanes<A>(b + 3 * kGroup) + margin;
-    for (unsigned near = near_shape(shape, pose, centre, reach); near != 0; near &= near - 1) {
-      const int tile = group * kGroup + __builtin_ctz(near),
-                rest = pair.n_points - tile * kContactTile;
-      const double* p = pair.tile_points + 3 * kContactTile * tile;
-      for (int k = 0; k < kContactTile && k < rest; k += kGroup) {
+    const unsigned near_tiles = near_shape(shape, pose, centre, reach);
+    for (int two = 0; near_tiles >> two != 0; two += 2) {
+      const unsigned tiles = near_tiles >> two & 3U;
+      if (tiles == 0) continue;
+      const int first = group * kGroup + two;
+      const double* const eights =
+          pair.eight_bounds == nullptr ? nullptr : pair.eight_bounds + 2 * kGroup * first;
+      for (unsigned near = near_eights(shape, pose, eights, tiles, margin); near != 0;
+           near &= near - 1) {
+        const int eight = __builtin_ctz(near), tile = first + eight / kEights,
+                  k = eight % kEights * kGroup;
+        if (tile * kContactTile + k >= pair.n_points) break;
+        const double* p = pair.tile_points + 3 * kContactTile * tile;
         const Vec3<N> place = {load_lanes<A>(p + k), load_lanes<A>(p + kContactTile + k),
                                load_lanes<A>(p + 2 * kContactTile + k)};
         const unsigned in = near_shape(shape, pose, place, margin);

@@ -151,6 +151,9 @@ struct PairContact {
                               ///< kContactTile points, padded with far points
   const double* tile_bounds;  ///< (ceil(n_tiles/8), 4, 8) centres and radii of the tiles, padded
                               ///< with far tiles
+  /// (ceil(n_tiles/2), 4, 8) centres and radii of every eight points of a tile, padded with far
+  /// balls; or null: nothing is known of them.
+  const double* eight_bounds = nullptr;
   /// (n_points) area for which each point stands [m²]: coefficients count per area. Null: they
   /// count per point.
   const double* weights;

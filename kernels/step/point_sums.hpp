@@ -94,17 +94,104 @@ void add_own_points(const Motion& motion, const LawParameters<Lanes<A>>& law, co
   }
 }
 
-/// Broadcasts a motion to all lanes. If it is made of vectors, lane `from` of each is taken.
-template <class A, class Motion>
-auto in_all_lanes(const Motion& motion, int from) {
-  using To = typename Motion::template Of<Lanes<A>>;
-  constexpr int kStep = sizeof(Motion) == sizeof(To) ? kGroup : 1;
+/// Broadcasts numbers to all lanes. If they are vectors, lane `from` of each is taken.
+template <class A, class To, class From>
+To broadcast_lane(const From& numbers, int from) {
+  constexpr int kStep = sizeof(From) == sizeof(To) ? kGroup : 1;
   To out;
-  const double* x = reinterpret_cast<const double*>(&motion);
+  const double* x = reinterpret_cast<const double*>(&numbers);
   Lanes<A>* y = reinterpret_cast<Lanes<A>*>(&out);
   for (std::size_t i = 0; i < sizeof(To) / sizeof(Lanes<A>); ++i)
     y[i] = Lanes<A>(x[i * kStep + from]);
   return out;
+}
+/// The same for a motion.
+template <class A, class Motion>
+auto in_all_lanes(const Motion& motion, int from) {
+  return broadcast_lane<A, typename Motion::template Of<Lanes<A>>>(motion, from);
+}
+
+/// How one lane's own candidates touch a shape whose points are summed one by one, in all lanes.
+template <class A>
+struct OwnCandidates {
+  const PairContact& pair;
+  Vec3<Lanes<A>> size, side;
+  Frame<Lanes<A>> frame;
+  Vec6<Lanes<A>> W;
+  LawParameters<Lanes<A>> law;
+};
+
+/// Adds the own candidates of a lane. The law and its derivative are evaluated at eight of them at
+/// a time, and added one by one in list order to the numbers of a PairSums, `stride` apart. This
+/// gives the bits of add_candidates() for a fraction of the work.
+template <bool Derivatives, class A, class List>
+[[gnu::noinline]] void add_own_candidates(const OwnCandidates<A>& c, const List& list, double* sums,
+                                          int stride) {
+  using N = Lanes<A>;
+  with_touched<N>(c.pair, c.size, c.side, [&]<class Shape>(const Shape& shape) {
+    if constexpr (Shape::kSums == PointSumForm::points) {
+      LawParameters<N> law = c.law;
+      for (int first = 0; first < list.own_count; first += kGroup) {
+        Vec3<N> xi;
+        load_own_place<A>(list, first, xi);
+        if (list.own_weights != nullptr)
+          set_weighted(c.law, load_lanes<A>(list.own_weights + first), law);
+        PairSums<N> own = PairSums<N>::zero();
+        const unsigned touching =
+            accumulate<Derivatives>(own, shape, law, c.frame.R, c.frame.p, c.W.a, c.W.l, xi);
+        if (touching == 0) continue;
+        const double* from = reinterpret_cast<const double*>(&own);
+        constexpr std::size_t count = Derivatives ? sizeof(own) / sizeof(N) : 6;
+        for (std::size_t i = 0; i < count; ++i) {
+          double sum = sums[i * std::size_t(stride)];
+          for (unsigned left = touching; left != 0; left &= left - 1)
+            sum += from[i * kGroup + std::size_t(__builtin_ctz(left))];
+          sums[i * std::size_t(stride)] = sum;
+        }
+      }
+    }
+  });
+}
+
+/// The same, from the numbers of a stage. Returns false where no lane is alone.
+template <bool Derivatives, class N>
+bool add_lone_candidates(const PairContact&, const Vec3<N>&, const Vec3<N>&, const Frame<N>&,
+                         const Vec6<N>&, const LawParameters<N>&, const CandidateList<N>&, int,
+                         PairSums<N>&) {
+  return false;
+}
+template <bool Derivatives, class A, class N>
+void add_lone(const PairContact& pair, const Vec3<N>& size, const Vec3<N>& side,
+              const Frame<N>& frame, const Vec6<N>& W, const LawParameters<N>& law,
+              const CandidateList<N>& list, int lane, PairSums<N>& sums) {
+  using V = Lanes<A>;
+  constexpr int kStride = sizeof(N) / sizeof(double);
+  const auto all = [lane](const N& x) { return V(reinterpret_cast<const double*>(&x)[lane]); };
+  const OwnCandidates<A> own = {
+      pair,
+      broadcast_lane<A, Vec3<V>>(size, lane),
+      broadcast_lane<A, Vec3<V>>(side, lane),
+      broadcast_lane<A, Frame<V>>(frame, lane),
+      broadcast_lane<A, Vec6<V>>(W, lane),
+      {transformed(law, all), law.law, law.ramp, all(law.friction_tangent)}};
+  add_own_candidates<Derivatives>(own, list, reinterpret_cast<double*>(&sums) + lane, kStride);
+}
+template <bool Derivatives, class A>
+bool add_lone_candidates(const PairContact& pair, const Vec3<OneLane<A>>& size,
+                         const Vec3<OneLane<A>>& side, const Frame<OneLane<A>>& frame,
+                         const Vec6<OneLane<A>>& W, const LawParameters<OneLane<A>>& law,
+                         const CandidateList<OneLane<A>>& list, int, PairSums<OneLane<A>>& sums) {
+  add_lone<Derivatives, A>(pair, size, side, frame, W, law, list, 0, sums);
+  return true;
+}
+template <bool Derivatives, class A>
+bool add_lone_candidates(const PairContact& pair, const Vec3<Lanes<A>>& size,
+                         const Vec3<Lanes<A>>& side, const Frame<Lanes<A>>& frame,
+                         const Vec6<Lanes<A>>& W, const LawParameters<Lanes<A>>& law,
+                         const CandidateList<Lanes<A>>& list, int lone, PairSums<Lanes<A>>& sums) {
+  if (lone < 0) return false;
+  add_lone<Derivatives, A>(pair, size, side, frame, W, law, list, lone, sums);
+  return true;
 }
 
 /// How the points of a pair of links are summed: row by row of their lists.

@@ -248,10 +248,10 @@ void set_point_law(const LawParameters<N>& law, const CandidateList<N>& list, in
 /// ellipsoids, meshes and balls.
 template <bool Derivatives, class Shape, class N>
 void add_candidates(const Shape& shape, const LawParameters<N>& law, const CandidateList<N>& list,
-                    int lone, const Frame<N>& frame, const Vec6<N>& W, PairSums<N>& sums) {
+                    const Frame<N>& frame, const Vec6<N>& W, PairSums<N>& sums) {
   LawParameters<N> own = law;
-  for_each_place(list, lone, [&](int k, const Vec3<N>& xi) {
-    set_point_law(law, list, lone, k, own);
+  for_each_place(list, -1, [&](int k, const Vec3<N>& xi) {
+    set_point_law(law, list, -1, k, own);
     accumulate<Derivatives>(sums, shape, own, frame.R, frame.p, W.a, W.l, xi);
   });
 }
@@ -355,7 +355,10 @@ void sum_link_pair(const ModelView& model, const LinkPair& links, const StageArg
         if constexpr (!kBall)
           if (elastic)
             return add_elastic<Derivatives>(shape, law, list, a.lone, frame(), o.W, o.sums);
-        add_candidates<Derivatives>(shape, law, list, a.lone, frame(), o.W, o.sums);
+        if (add_lone_candidates<Derivatives>(pair, size, side, frame(), o.W, law, list, a.lone,
+                                             o.sums))
+          return;
+        add_candidates<Derivatives>(shape, law, list, frame(), o.W, o.sums);
       } else {
         const FaceMotion<Shape, N> motion = {frame(), o.W, shape};
         if (elastic) {

@@ -67,19 +67,26 @@ auto near_box(const DistanceGrid& g, const Vec3<N>& y, const N& m) {
 
 /// Whether a place may be nearer than m to a mesh of scale 1: not beyond m of the box of what
 /// touches, and not where φ is more than it can fall on the way. Also true for slightly larger
-/// distances.
-template <class N>
+/// distances. `Rough`: bounds of cells stand for φ.
+template <bool Rough = false, class N>
 auto near_mesh(const DistanceGrid& g, const Vec3<N>& y, const N& m) {
   const N zero(0.0);
   auto near = near_box(g, y, m);
   if (!any(near)) return near;
-  const GridPoint<N> point(g, in_cells(g, y));
+  GridPoint<N> point(g, in_cells(g, y));
   const N fall = N(g.slope) * m;
-  near = near & ((point.beyond > zero) | (floor_at(g, point.at) < fall));
-  if (!any(near)) return near;
+  // Nothing is read of lanes that are decided.
+  const auto beyond = point.beyond > zero;
+  const auto read_in = [&](const auto& lanes) {
+    point.at.whole[0] = select(lanes, point.at.whole[0], N(kNowhere));
+    return any(lanes);
+  };
+  if (!read_in(near & (point.beyond <= zero))) return near;
+  near = near & (beyond | (floor_at(g, point.at) < fall));
+  if (Rough || !read_in(near & (point.beyond <= zero))) return near;
   SplineValue<N, 0> phi;
   spline_at(g, point.at, phi);
-  near = near & ((point.beyond > zero) | (phi.value < fall));
+  near = near & (beyond | (phi.value < fall));
   return near;
 }
 
@@ -206,6 +213,12 @@ struct MeshDistance {
 template <class N>
 auto nearer_than(const MeshDistance<N>& shape, const Vec3<N>& y, const N& m) {
   return near_mesh(*shape.grid, shape.inverse * y, shape.inverse * m);
+}
+
+/// Whether a place may be nearer than m, from bounds of cells alone.
+template <class N>
+auto roughly_nearer_than(const MeshDistance<N>& shape, const Vec3<N>& y, const N& m) {
+  return near_mesh<true>(*shape.grid, shape.inverse * y, shape.inverse * m);
 }
 
 /// Under a pad, a tile's centre is split into a cell, which is a whole number, and what is left.
