@@ -5,6 +5,7 @@
 // that may be nearest to one of its nodes, with d and g at its middle c. With T the nearest
 // triangle to c, D and G its distance and gradient there, and |s| ≤ ρ in the block,
 //   d_T(c + s) ≤ D + G·s + ρ²/(2 (D - ρ)) if ρ < D, and d_T(c + s) ≤ D + ρ
+// A gradient at a distance far below ρ is not accurate enough for that: both count as zero there.
 // A triangle whose bound is above one of these in the whole block is left out. A part of the block
 // starts from the bounds of the whole, and computes the distances of few triangles anew.
 #include "engine/model/node_distances.hpp"
@@ -57,6 +58,12 @@ struct Candidate {
 struct NodeBlock {
   int first[3], count[3];  ///< nodes
 
+  /// The distance from the middle to a corner [m].
+  [[nodiscard]] double radius(double cell) const {
+    double square = 0;
+    for (const int n : count) square += (n - 1) * (n - 1);
+    return 0.5 * cell * std::sqrt(square);
+  }
   [[nodiscard]] Vec3<double> middle(const GridNodes& nodes) const {
     const auto along = [&](int k) {
       return nodes.origin[k] + (first[k] + 0.5 * (count[k] - 1)) * nodes.cell;
@@ -65,20 +72,19 @@ struct NodeBlock {
   }
 };
 
+/// Distances at a block's middle below this part of its radius count as zero, with gradient zero.
+constexpr double kTouching = 1e-4;
+
 /// Leaves out triangles that are nearest to no node of a block.
 class BlockFilter {
  public:
   /// `nearest`: a triangle at the block's middle. `margin`: far above rounding [m].
   BlockFilter(const NodeBlock& block, double cell, const Candidate& nearest, double margin)
       : gradient_(nearest.g) {
-    double square = 0;
     double* half = &half_.x;
-    for (int k = 0; k < 3; ++k) {
-      half[k] = 0.5 * (block.count[k] - 1) * cell;
-      square += half[k] * half[k];
-    }
-    const double radius = std::sqrt(square);
-    most_ = nearest.d + radius + margin;
+    for (int k = 0; k < 3; ++k) half[k] = 0.5 * (block.count[k] - 1) * cell;
+    const double radius = block.radius(cell), square = radius * radius;
+    most_ = nearest.d + (1 + kTouching) * radius + margin;
     most_beside_ =
         nearest.d + margin + (nearest.d > radius ? square / (2 * (nearest.d - radius)) : HUGE_VAL);
   }
@@ -120,7 +126,8 @@ class NodeDistances {
     const NodeBlock all = {{0, 0, 0}, {nodes_.count[0], nodes_.count[1], nodes_.count[2]}};
     const Vec3<double> middle = all.middle(nodes_);
     std::vector<Candidate> list;
-    for (std::size_t t = 0; t < triangles_.size(); ++t) add(middle, static_cast<int>(t), list);
+    for (std::size_t t = 0; t < triangles_.size(); ++t)
+      add(middle, all.radius(nodes_.cell), static_cast<int>(t), list);
     for_each_part(all, [&](const NodeBlock& part) { fill(part, list, middle, 0); });
     return std::move(out_);
   }
@@ -142,14 +149,16 @@ class NodeDistances {
     }
   }
 
-  /// Appends a triangle with its distance and gradient at c. One that has no nearest place is left
+  /// Appends a triangle with its distance and gradient at the middle c of a block. One that has no nearest place is left
   /// out: its edges belong to its neighbours as well.
-  void add(const Vec3<double>& c, int triangle, std::vector<Candidate>& list) const {
+  void add(const Vec3<double>& c, double radius, int triangle, std::vector<Candidate>& list) const {
     const Vec3<double> way = to_triangle(c, triangles_[std::size_t(triangle)]);
     const double d = std::sqrt(dot(way, way));
     if (!(d >= 0)) return;
-    const Vec3<double> zero = {0, 0, 0};
-    list.push_back({d, d > margin_ ? (-1 / d) * way : zero, triangle});
+    if (d > std::max(margin_, kTouching * radius))
+      list.push_back({d, (-1 / d) * way, triangle});
+    else
+      list.push_back({0, {0, 0, 0}, triangle});
   }
 
   /// `list`: triangles that may be nearest, with their numbers at the place `from`.
@@ -168,13 +177,14 @@ class NodeDistances {
     if (lists_.size() <= depth) lists_.resize(depth + 1);
     std::vector<Candidate> own = std::move(lists_[depth]);  // keeps its memory
     own.clear();
-    add(c, list[first].triangle, own);
+    const double radius = block.radius(nodes_.cell);
+    add(c, radius, list[first].triangle, own);
     const Candidate far = {HUGE_VAL, {0, 0, 0}, 0};
     const BlockFilter filter(block, nodes_.cell, own.empty() ? far : own[0], margin_);
     for (std::size_t n = 0; n < list.size(); ++n)
       if (n != first && filter.keeps(bounds_[n], list[n].g)) {
         const std::size_t before = own.size();
-        add(c, list[n].triangle, own);
+        add(c, radius, list[n].triangle, own);
         if (own.size() > before && !filter.keeps(own.back().d, own.back().g)) own.pop_back();
       }
     for_each_part(block, [&](const NodeBlock& part) { fill(part, own, c, depth + 1); });

@@ -180,6 +180,7 @@ int search_shape(const CandidateSearch& s, Shape shape) {
       const unsigned tiles = near_tiles >> two & 3U;
       if (tiles == 0) continue;
       const int first = group * kGroup + two;
+      if (first >= pair.n_tiles) break;  // padding, near where the pose is not finite
       const double* const eights =
           pair.eight_bounds == nullptr ? nullptr : pair.eight_bounds + 2 * kGroup * first;
       for (unsigned near = near_eights(shape, pose, eights, tiles, margin); near != 0;

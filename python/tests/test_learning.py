@@ -43,9 +43,11 @@ import tangere.torch  # noqa: E402
 def run(program: str, *arguments: str) -> dict:
     """What a program prints with --json. It runs here: PyTorch is imported once."""
     path, printed = LEARNING / program, io.StringIO()
-    words = [str(path), *arguments, "--json"]
+    words, threads = [str(path), *arguments, "--json"], torch.get_num_threads()
     with unittest.mock.patch.object(sys, "argv", words), contextlib.redirect_stdout(printed):
-        runpy.run_path(str(path), run_name="__main__")
+        with torch.random.fork_rng(devices=[]):
+            runpy.run_path(str(path), run_name="__main__")
+    torch.set_num_threads(threads)
     return json.loads(printed.getvalue())
 
 

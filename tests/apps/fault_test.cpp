@@ -82,10 +82,10 @@ std::vector<Job> jobs() {
 bool lies(const std::string& kind) { return kind == "lost" || kind == "zeros"; }
 
 /// Calls of a kind that are tried; none given: about two, one of every `calls` / 2. Of those that
-/// lie it is twice as many: a later write may replace what one of them has lost.
+/// lie it is three times as many: a later write may replace what one of them has lost.
 long tries_of(const std::string& kind, long calls) {
   const char* const given = std::getenv("TANGERE_FAULTS");
-  if (given == nullptr) return std::min(calls, lies(kind) ? 4L : 2L);
+  if (given == nullptr) return std::min(calls, lies(kind) ? 6L : 2L);
   return std::string(given) == "all" ? calls : std::stol(given);
 }
 

@@ -33,7 +33,7 @@ kernels='
   add_chunk:34 add_sphere:8                 contacts: the same for balls, for flat and bent faces,
   add_elastic:12 accumulate_elastic:12      and for other shapes, with memory of friction and without
   add_load_entries:8
-  pair_adjoint:18 pull_back_motion:16       reverse: the same for what a gradient needs, and for
+  pair_adjoint:18 pull_back_motion:18       reverse: the same for what a gradient needs, and for
                                             spheres that touch with their surface
   parameter_products:4'
 names=$(nm -C --defined-only "$library" | sed -E 's/tangere::kernels:://g; /\{lambda|\[clone/d')

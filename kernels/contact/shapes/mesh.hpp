@@ -53,13 +53,13 @@ struct GridPoint {
   }
 };
 
-/// Whether a place is nearer than m to the box of what touches.
+/// Whether a place is nearer than m to the box of what touches. False where it is not finite.
 template <class N>
 auto near_box(const DistanceGrid& g, const Vec3<N>& y, const N& m) {
   const N* p = &y.x;
   N square(0.0);
   for (int k = 0; k < 3; ++k) {
-    const N beyond = max(max(N(g.low[k]) - p[k], p[k] - N(g.high[k])), N(0.0));
+    const N beyond = max(N(0.0), max(N(g.low[k]) - p[k], p[k] - N(g.high[k])));
     square = mul_add(beyond, beyond, square);
   }
   return square < m * m;

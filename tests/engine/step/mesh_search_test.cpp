@@ -132,7 +132,6 @@ TEST(MeshSearch, NothingWithinReachOfAFrameIsLeftOut) {
   expect_nothing_is_left_out(testing::frame_mesh(0.02, 0.01, 0.006));
 }
 
-/// A part of a tile that is not full has eights without points.
 TEST(MeshSearch, TheBallsOfEightHoldTheirPoints) {
   const PadOnMesh pad(testing::cuboid_mesh({0.01, 0.01, 0.01}));
   const PairContact& pair = *pad.pair;

@@ -52,7 +52,7 @@ TEST(CandidateBytes, CoverTheListsOfShippedScenes) {
 }
 
 TEST(CandidateBytes, AreNoneWhereListsAreNotKept) {
-  const Model model(read_scene(TANGERE_SOURCE_DIR "/scenes/grip_rod.xml").scene);
+  const Model model(read_scene(TANGERE_SOURCE_DIR "/scenes/ten_boxes.xml").scene);
   EXPECT_EQ(Stepper::candidate_bytes(model), 0u);
 }
 
