@@ -258,7 +258,7 @@ struct CompiledModel {
   std::vector<std::vector<double>> point_storage;           ///< what pairs and grounds point into
   std::vector<std::shared_ptr<const MeshGrid>> mesh_grids;  ///< what bodies' grids are in
   std::vector<AlignedVector<double>>
-      tile_storage;  ///< what pairs' tile_points, tile_bounds and eight_bounds and grounds' tiles point into
+      tile_storage;  ///< what the tiles of pairs and of grounds point into
   std::vector<std::vector<int>> order_storage;  ///< what grounds' in_tiles point into
   std::vector<VaryingInertia> varying_inertia;
   std::vector<VaryingSize> varying_sizes;

@@ -149,8 +149,8 @@ class NodeDistances {
     }
   }
 
-  /// Appends a triangle with its distance and gradient at the middle c of a block. One that has no nearest place is left
-  /// out: its edges belong to its neighbours as well.
+  /// Appends a triangle with its distance and gradient at the middle c of a block. One that has no
+  /// nearest place is left out: its edges belong to its neighbours as well.
   void add(const Vec3<double>& c, double radius, int triangle, std::vector<Candidate>& list) const {
     const Vec3<double> way = to_triangle(c, triangles_[std::size_t(triangle)]);
     const double d = std::sqrt(dot(way, way));

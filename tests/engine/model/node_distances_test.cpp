@@ -60,6 +60,33 @@ TEST(NodeDistances, FarFromTheOriginTheyAreTheLeastToo) {
   expect_least_of_all(mesh, 16, 0.04);
 }
 
+/// The middle of all nodes is `offset` away from a plane of many triangles, whose gradient there is
+/// hardly more than rounding.
+TEST(NodeDistances, CloseToATriangleTheyAreTheLeastToo) {
+  constexpr int kSide = 6;
+  for (const double offset : {0.0, 1e-12, 1e-11, 1e-10, 1e-9, 1e-8}) {
+    MeshShape mesh;
+    for (int i = 0; i <= kSide; ++i)
+      for (int j = 0; j <= kSide; ++j)
+        for (const double x : {0.007 * (i - 3), 0.007 * (j - 3) + 1e-3 * i, offset})
+          mesh.vertices.push_back(x);
+    for (int i = 0; i < kSide; ++i)
+      for (int j = 0; j < kSide; ++j) {
+        const int at = i * (kSide + 1) + j;
+        mesh.triangles.push_back({at, at + kSide + 1, at + 1});
+        mesh.triangles.push_back({at + kSide + 1, at + kSide + 2, at + 1});
+      }
+    // These two set the box around all.
+    for (const double z : {-0.02, 0.02}) {
+      const int at = static_cast<int>(mesh.vertices.size() / 3);
+      for (const double x : {-0.024, -0.024, z, 0.027, 0.024, z, 0.0, 0.001, z})
+        mesh.vertices.push_back(x);
+      mesh.triangles.push_back({at, at + 1, at + 2});
+    }
+    expect_least_of_all(mesh, 17, 0.05);
+  }
+}
+
 /// Triangles anywhere, long and thin ones, and some that are a line or a point.
 TEST(NodeDistances, OfAnyTrianglesTheyAreTheLeast) {
   Random random(3);

@@ -132,6 +132,18 @@ TEST(MeshSearch, NothingWithinReachOfAFrameIsLeftOut) {
   expect_nothing_is_left_out(testing::frame_mesh(0.02, 0.01, 0.006));
 }
 
+TEST(MeshSearch, APoseThatIsNotFiniteListsNothing) {
+  const PadOnMesh pad(testing::ellipsoid_mesh(2, {0.02, 0.015, 0.01}));
+  for (const double wrong : {std::nan(""), HUGE_VAL, -HUGE_VAL})
+    for (const int number : {9, 11}) {
+      Random random(5);
+      Pose pose = drawn_pose(random);
+      pose.numbers[number] = wrong;
+      for (const KernelTable* table : kernels::available_kernels())
+        EXPECT_TRUE(listed(*table, *pad.pair, pose, 1, 1e-3).empty()) << table->name;
+    }
+}
+
 TEST(MeshSearch, TheBallsOfEightHoldTheirPoints) {
   const PadOnMesh pad(testing::cuboid_mesh({0.01, 0.01, 0.01}));
   const PairContact& pair = *pad.pair;

@@ -52,7 +52,23 @@ TEST(CandidateBytes, CoverTheListsOfShippedScenes) {
 }
 
 TEST(CandidateBytes, AreNoneWhereListsAreNotKept) {
-  const Model model(read_scene(TANGERE_SOURCE_DIR "/scenes/ten_boxes.xml").scene);
+  constexpr int kBoxes = 17;  // 136 pairs
+  std::string links, pairs;
+  for (int a = 0; a < kBoxes; ++a) {
+    const std::string name = "b" + std::to_string(a);
+    links +=
+        "<robot><link name='" + name + "'><joint name='" + name + "' type='free3d'/><body name='" +
+        name +
+        "' type='cuboid' size='0.1 0.1 0.1' general_contact_resolution='2 2 2'/></link></robot>";
+    for (int b = 0; b < a; ++b)
+      pairs += "<general_primitive_contact general_body='" + name + "' primitive_body='b" +
+               std::to_string(b) + "' kn='1e3'/>";
+  }
+  const Model model(
+      parse_scene("<tangere><option unit='m-kg'/><default><body density='600'/></default>" + links +
+                      "<contact>" + pairs + "</contact></tangere>",
+                  "boxes")
+          .scene);
   EXPECT_EQ(Stepper::candidate_bytes(model), 0u);
 }
 
