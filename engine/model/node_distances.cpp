@@ -133,7 +133,7 @@ class NodeDistances {
   }
 
  private:
-  /// Calls f for the up to eight halves of halves of a block.
+  /// Calls f for the parts of a block that is halved along every axis, at most eight.
   template <class F>
   static void for_each_part(const NodeBlock& block, const F& f) {
     for (int part = 0; part < 8; ++part) {
@@ -191,6 +191,8 @@ class NodeDistances {
     lists_[depth] = std::move(own);
   }
 
+  /// Computes the distance of the only node of a block, which is at `at`. `first`: the triangle of
+  /// the lowest bound in the list.
   void set_node(const NodeBlock& block, const std::vector<Candidate>& list, const Vec3<double>& at,
                 std::size_t first) {
     const auto square = [&](std::size_t n) {

@@ -25,8 +25,9 @@ unsigned near_shape(const Shape& shape, const Frame<N>& pose, const Vec3<N>& pla
   }
 }
 
-/// Returns which eights of two neighbouring tiles may be nearer than m to a shape posed there, of
-/// tiles 0 and 1 in `tiles`: bits 0 … 3 are those of the first. All, where no bounds are known.
+/// Returns which groups of eight points of two neighbouring tiles may be nearer than m to a shape
+/// posed there, of tiles 0 and 1 in `tiles`: bits 0 … 3 are those of the first. All, where `bounds`
+/// is null.
 template <class Shape, class A>
 unsigned near_eights(const Shape& shape, const Frame<Lanes<A>>& pose, const double* bounds,
                      unsigned tiles, const Lanes<A>& m) {

@@ -152,7 +152,7 @@ struct PairContact {
   const double* tile_bounds;  ///< (ceil(n_tiles/8), 4, 8) centres and radii of the tiles, padded
                               ///< with far tiles
   /// (ceil(n_tiles/2), 4, 8) centres and radii of every eight points of a tile, padded with far
-  /// balls; or null: nothing is known of them.
+  /// balls; or null in pairs without such balls.
   const double* eight_bounds = nullptr;
   /// (n_points) area for which each point stands [m²]: coefficients count per area. Null: they
   /// count per point.

@@ -43,6 +43,7 @@ struct Object {
 };
 std::vector<Object> objects() {
   return {{"box of 8 corners", testing::cuboid_mesh({0.02, 0.03, 0.015})},
+          {"cube", testing::cuboid_mesh({0.02, 0.02, 0.02})},
           {"plate", testing::cuboid_mesh({0.03, 0.03, 0.006})},
           {"wedge", prism_mesh({{-0.02, -0.015}, {0.03, -0.015}, {-0.02, 0.02}}, 0.02)},
           {"hexagonal bar", prism_mesh({{0.02, 0},
@@ -57,7 +58,8 @@ std::vector<Object> objects() {
           {"bottle", testing::turned_mesh(
                          {{-0.04, 0.018}, {0.01, 0.018}, {0.022, 0.008}, {0.04, 0.008}}, 24)},
           {"egg", testing::ellipsoid_mesh(2, {0.018, 0.022, 0.03})},
-          {"ring", testing::torus_mesh(0.022, 0.008, 24, 12)}};
+          {"ring", testing::torus_mesh(0.022, 0.008, 24, 12)},
+          {"capsule", testing::capsule_mesh(0.012, 0.02, 16)}};
 }
 
 /// Plates of 0.1 kg that move along y, and an object between them.

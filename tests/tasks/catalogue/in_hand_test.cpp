@@ -104,7 +104,7 @@ TEST(InHand, TipsGoAroundTheAxisOnePairAtATime) {
   EXPECT_NEAR(slope, 0.087 / 1.5, 1e-12) << "a tip 87 mm below its hip has that lever";
 }
 
-TEST(InHand, AnObjectThatIsHeldForHalfAMinuteStays) {
+TEST(InHand, AnObjectThatIsHeldForAMinuteStays) {
   const Scene scene = in_hand_scene();
   const auto task = task_named("in_hand");
   Batch batch(Model(scene), 4, 5);
@@ -119,7 +119,7 @@ TEST(InHand, AnObjectThatIsHeldForHalfAMinuteStays) {
     batch.set_state(e, q, v);
   }
   std::array<std::vector<double>, 4> early;
-  for (int step = 0; step < 6000; ++step) {
+  for (int step = 0; step < 12000; ++step) {
     const double closed = std::clamp((step - 60) / 60.0, 0.0, 1.0);
     for (std::size_t e = 0; e < 4; ++e) {
       gait.closing(closed, std::span(u).subspan(e * nu, 12));
@@ -137,7 +137,7 @@ TEST(InHand, AnObjectThatIsHeldForHalfAMinuteStays) {
     for (std::size_t c = 0; c < 3; ++c)
       moved = std::max(moved, std::abs(q[kObject + c] - early[std::size_t(e)][kObject + c]));
     EXPECT_GT(q[kObject + 2], -6e-3) << "environment " << e << " lets it fall";
-    EXPECT_LT(moved, 1e-4) << "environment " << e << ", from 2 to 30 s [m]";
+    EXPECT_LT(moved, 1e-4) << "environment " << e << ", from 2 to 60 s [m]";
   }
 }
 
