@@ -36,7 +36,8 @@ class CandidateLists {
   void reserve(const CompiledModel& model, std::size_t pair, int points);
   /// Empties the lists of `lanes`, which have none then.
   void clear(LaneBits lanes);
-  /// Marks the anchors of all lists as those of an earlier solve. They are computed anew before use.
+  /// Marks the anchors of all lists as those of an earlier solve. They are computed anew before
+  /// use.
   void drop_anchors();
   /// Returns the bytes of the lists of a scene if they hold all points of all pairs, but at most
   /// `most` of two links.
